@@ -1,22 +1,21 @@
 """Makes the model that comes with derain from a seed: worlds, training, threshold, file.
 
-    python -m benchmarks.make_default --out made
-    python -m benchmarks.make_default --out made --clean clean/    # counts clean scans, too
-    python -m benchmarks.make_default --out made1 --seed 1 --worlds made/worlds
-    python -m benchmarks.make_default --out cues --cues made/model.ckpt --clean clean/
+    python -m benchmarks.make_default --out made --clean clean/ --unlabelled drive/
+    python -m benchmarks.make_default --out made --clean clean/ --seed 1    # on the same worlds
 
-It is trained on one world and then, at a lower rate, on a calm one, in which whatever lies alone
-right before the sensor is of its carrier. With ``--cues`` there is one training, of the network of
-cues on a geometry that has been trained, on other scans of the first world; the model that comes
-with derain is not made so. Leaves ``model.onnx`` and ``model.ckpt`` in the folder, and the table
-that the threshold was chosen by. That is the one of highest IoU over scans of the first world that
-were held out, raised until no clean scan that is given loses more than MOST_TAKEN (with cues,
-MOST_TAKEN_BY_CUES), as long as that costs no more than MOST_LOST of the IoU. No label of a real
-scan is read.
+It is trained by `cues_worlds.yaml`, on worlds alone. Leaves ``model.onnx`` and ``model.ckpt`` in
+``OUT/seed_<seed>``, and the table that the threshold was chosen by. That is
+the one of highest IoU over the worlds that were held out, raised until no clean scan that is given
+loses more than MOST_TAKEN, as long as that costs no more than MOST_LOST of the IoU. What is added
+to the log-odds of scans without intensities makes the model agree best with itself, as it judges
+unlabelled scans with their intensities; it is no more than clean scans without any allow. No label
+of a real scan is read.
 """
 
 import argparse
 import json
+import shutil
+import subprocess
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -24,84 +23,117 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.stages import Stage, trained
+from benchmarks.installed import DERAIN
 from derain.cards.card import load_card
 from derain.datamodules.worlds import Worlds
+from derain.errors import InputError
 from derain.evaluation.text_tables import markdown_table
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.models.checkpoint import load_model, save_model
+from derain.models.cues import CueFusion
 from derain.scan import Scan
 from derain.sources.folders import named_frames
+
+CONFIGURATION = "cues_worlds.yaml"
+
+# Where the configuration makes its worlds.
+WORLDS = "runs/worlds"
 
 # Thresholds to choose from.
 THRESHOLDS = tuple(np.round(np.arange(0.3, 0.951, 0.05), 2).tolist())
 
+# What may be added to the log-odds of scans without intensities; 0 where there are no unlabelled
+# scans to choose by.
+ADDED = tuple(np.arange(0, 4.01, 0.25).tolist())
+
 # Share of a clean scan that may be taken, and of the highest IoU that may be given for it.
-MOST_TAKEN, MOST_TAKEN_BY_CUES = 1e-3, 3e-4
+MOST_TAKEN = 3e-4
 MOST_LOST = 0.02
 
 
 def main() -> None:
     """Runs the command."""
     arguments = _parser().parse_args()
-    out: Path = arguments.out
+    out: Path = arguments.out / f"seed_{arguments.seed}"
     out.mkdir(parents=True, exist_ok=True)
-    worlds = arguments.worlds or out / "worlds"
-    first = Stage("world", worlds / "world", 900, 60, 10, 0.005)
-    second = Stage("calm", worlds / "calm", 320, 40, 4, 0.002)
-    cues = Stage("world", worlds / "others", 500, 60, 16, 0.005, 7, "cued_outdet_worlds.yaml")
-    trainings = out / "trainings"
-    if arguments.cues is None:
-        checkpoint = trained(first, trainings / "world", arguments.seed)
-        checkpoint = trained(second, trainings / "calm", arguments.seed, start=checkpoint)
-    else:
-        checkpoint = trained(cues, trainings / "cues", arguments.seed, start=arguments.cues)
+    model = load_model(trained(arguments.out, out / "training", arguments.seed))
+    assert isinstance(model, CueFusion)
     unchosen = out / "unchosen.onnx"
-    model = load_model(checkpoint)
     export(model, unchosen)
     derainer = Derainer(str(unchosen))
-    iou = _iou(derainer, _held_out(cues if arguments.cues else first))
+    iou = _iou(derainer, _held_out(arguments.out / WORLDS))
     taken = {Path(scan.name).name: _taken(derainer, scan) for scan in _scans(arguments.clean)}
-    threshold = chosen(iou, taken, MOST_TAKEN_BY_CUES if arguments.cues else MOST_TAKEN)
-    # Both worlds are simulated: what it was started from has the same licence.
-    licence = load_card("simulated").licence
-    spec = replace(model.spec, threshold=threshold, licence=licence)
+    threshold = chosen(iou, taken)
+    card = load_card("simulated")  # all its worlds have these classes
+    spec = replace(
+        model.spec,
+        threshold=threshold,
+        licence=card.licence,
+        classes=card.classes,
+        rain=tuple(card.rain),
+    )
     model.hparams["threshold"] = threshold
+    agreement = _agreement(derainer, _scans(arguments.unlabelled), threshold)
+    dark = [scan for scan in _scans(arguments.clean) if scan.measured_intensity is None]
+    taken_more = [_taken_when_added(derainer, scan, threshold) for scan in dark]
+    possible = [one for one in ADDED if all(of[one] <= MOST_TAKEN for of in taken_more)]
+    added = max(possible, key=lambda one: agreement[one], default=0.0)
+    model.hparams["without_intensity"] = model.network.without_intensity = added
     model.adopt(spec)
     save_model(model, out / "model.ckpt")
     export(model, out / "model.onnx")
     unchosen.unlink()
     table = _table(iou, taken, threshold)
     (out / "threshold.md").write_text(table, "utf-8")
-    content = {"threshold": threshold, "iou": iou, "taken": taken}
+    content = {"threshold": threshold, "iou": iou, "taken": taken, "agreement": agreement}
     (out / "threshold.json").write_text(json.dumps(content, indent=2) + "\n", "utf-8")
     print(table)
+    print(f"added without intensities: {added:g}; IoU with itself {agreement[added]:.3f}")
 
 
-def chosen(
-    iou: Mapping[float, float],
-    taken: Mapping[str, Mapping[float, float]],
-    most_taken: float = MOST_TAKEN,
-) -> float:
+def trained(folder: Path, training: Path, seed: int) -> Path:
+    """The last checkpoint of a training, which is not trained again where that has been done.
+
+    Args:
+        folder: Where worlds are made.
+        training: Folder of the training. One that did not end is removed, and begun anew.
+        seed: Seed of the training.
+
+    Raises:
+        InputError: derain failed.
+    """
+    ended = training / "ended.txt"
+    if not ended.exists():
+        shutil.rmtree(training, ignore_errors=True)
+        save = ["--trainer.logger.init_args.save_dir", str(training.absolute())]
+        command = ["fit", "--config", CONFIGURATION, "--seed_everything", str(seed), *save]
+        if subprocess.run([DERAIN, *command], cwd=folder, check=False).returncode:
+            raise InputError(training, "derain fit failed", "See above.")
+        ended.touch()  # last: a training that is stopped before is begun anew
+    (checkpoint,) = training.glob("*/version_0/checkpoints/last.ckpt")
+    return checkpoint
+
+
+def chosen(iou: Mapping[float, float], taken: Mapping[str, Mapping[float, float]]) -> float:
     """The threshold of highest IoU, raised as far as clean scans ask, and no farther than it may.
 
     Args:
         iou: IoU over worlds held out, by threshold.
         taken: Of each clean scan the share of its points called rain, by threshold.
-        most_taken: Share of a clean scan that may be taken.
     """
     best = max(sorted(iou), key=lambda threshold: iou[threshold])
     possible = [t for t in sorted(iou) if t >= best and iou[t] >= iou[best] - MOST_LOST]
-    clean = [t for t in possible if all(of[t] <= most_taken for of in taken.values())]
+    clean = [t for t in possible if all(of[t] <= MOST_TAKEN for of in taken.values())]
     return clean[0] if clean else possible[-1]
 
 
-def _held_out(stage: Stage) -> Iterator[tuple[Scan, NDArray[np.bool_]]]:
-    data = Worlds(str(stage.root), stage.campaign)
-    for frame in data.source("validation"):
-        scan = data.read(frame)
-        yield scan, data.card.rain_of(scan)
+def _held_out(worlds: Path) -> Iterator[tuple[Scan, NDArray[np.bool_]]]:
+    for folder in sorted(worlds.iterdir()):
+        data = Worlds(str(folder), make=False)
+        for frame in data.source("validation"):
+            scan = data.read(frame)
+            yield scan, data.card.rain_of(scan)
 
 
 def _iou(
@@ -129,10 +161,42 @@ def _scans(paths: Sequence[Path]) -> Iterator[Scan]:
         yield from (frame.read() for frame in named_frames(paths))
 
 
+def _agreement(derainer: Derainer, scans: Iterator[Scan], threshold: float) -> dict[float, float]:
+    """IoU of what is called rain with intensities and without, by what is added without them."""
+    both, either = np.zeros(len(ADDED)), np.zeros(len(ADDED))
+    for scan in scans:
+        called = derainer.probability(scan) > threshold
+        without_any = derainer.probability(replace(scan, intensity=None))
+        for number, added in enumerate(ADDED):
+            without = _log_odds(without_any) + added > _log_odds(np.float32(threshold))
+            both[number] += np.count_nonzero(called & without)
+            either[number] += np.count_nonzero(called | without)
+    return dict(zip(ADDED, (both / np.maximum(either, 1)).tolist(), strict=True))
+
+
+def _taken_when_added(derainer: Derainer, scan: Scan, threshold: float) -> dict[float, float]:
+    """Share of the points of a scan without intensities called rain, by what is added."""
+    log_odds = _log_odds(derainer.probability(scan)[scan.valid])
+    least = _log_odds(np.float32(threshold))
+    return {added: float((log_odds + added > least).mean()) for added in ADDED}
+
+
+def _log_odds(probability: NDArray[np.float32] | np.float32) -> NDArray[np.float64]:
+    known = np.clip(np.float64(probability), 1e-9, 1 - 1e-9)
+    log_odds: NDArray[np.float64] = np.log(known / (1 - known))
+    return log_odds
+
+
 def _table(
-    iou: Mapping[float, float], taken: Mapping[str, Mapping[float, float]], threshold: float
+    iou: Mapping[float, float],
+    taken: Mapping[str, Mapping[float, float]],
+    threshold: float,
 ) -> str:
-    columns = ["threshold", "IoU, worlds held out", *(f"{name}, % taken" for name in taken)]
+    columns = [
+        "threshold",
+        "IoU, worlds held out",
+        *(f"{name}, % taken" for name in taken),
+    ]
     rows = [
         [
             f"**{one:g}**" if one == threshold else f"{one:g}",
@@ -149,10 +213,11 @@ def _parser() -> argparse.ArgumentParser:
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument("--out", type=Path, required=True, help="folder to write to")
-    parser.add_argument("--worlds", type=Path, help="worlds that are there (default: OUT/worlds)")
     parser.add_argument("--seed", type=int, default=0, help="of the training")
-    parser.add_argument("--cues", type=Path, help="train cues on this checkpoint's geometry")
     parser.add_argument("--clean", type=Path, nargs="*", default=[], help="clean scans")
+    parser.add_argument(
+        "--unlabelled", type=Path, nargs="*", default=[], help="scans with intensities"
+    )
     return parser
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.cards.card import load_card
+from derain.datamodules.user_changes import across, along
 from derain.evaluation.text_tables import markdown_table
 from derain.export.methods import load_method
 from derain.files import read_scan
@@ -71,16 +72,16 @@ def changed(scan: Scan) -> Iterator[tuple[str, Scan]]:
     yield "every second row missing", scan.take(np.arange(0, len(scan), 2))
     yield "three of four rows missing", scan.take(np.arange(0, len(scan), 4))
     for spread in (0.02, 0.05):
-        across = _across(xyz, generator.normal(0, spread, (2, len(scan))))
-        yield f"noise of {100 * spread:g} cm across the ray", replace(scan, xyz=across)
-    along = _behind(xyz, generator.normal(0, 0.02, len(scan)))
-    yield "noise of 2 cm along the ray", replace(scan, xyz=along)
+        shaken = across(xyz, spread, generator)
+        yield f"noise of {100 * spread:g} cm across the ray", replace(scan, xyz=shaken)
+    shaken = along(xyz, generator.normal(0, 0.02, len(scan)))
+    yield "noise of 2 cm along the ray", replace(scan, xyz=shaken)
     yield "3 m aside of the sensor", replace(scan, xyz=xyz + np.float32([3, 0, 0]))
     yield "1 m above the sensor", replace(scan, xyz=xyz + np.float32([0, 0, 1]))
     yield "y > 0 alone", scan.take(xyz[:, 1] > 0)
     yield "in feet", replace(scan, xyz=(xyz / np.float32(FOOT)).astype(np.float32))
     for jitter in JITTERS:
-        copy = replace(scan, xyz=_behind(xyz, generator.normal(0, jitter, len(scan))))
+        copy = replace(scan, xyz=along(xyz, generator.normal(0, jitter, len(scan))))
         rows = np.arange(2 * len(scan)) % len(scan)
         twice = replace(scan.take(rows), xyz=np.concatenate([xyz, copy.xyz]))
         yield f"doubled, ranges {1e3 * jitter:g} mm apart", twice
@@ -91,7 +92,7 @@ def doubled(scan: Scan) -> Iterator[tuple[str, Scan]]:
     yield "clean KITTI, unchanged", scan
     rows = np.arange(2 * len(scan)) % len(scan)
     for behind in COPIES_BEHIND:
-        xyz = np.concatenate([scan.xyz, _behind(scan.xyz, np.full(len(scan), behind))])
+        xyz = np.concatenate([scan.xyz, along(scan.xyz, np.full(len(scan), behind))])
         yield f"clean KITTI, doubled at {1e3 * behind:g} mm", replace(scan.take(rows), xyz=xyz)
 
 
@@ -99,21 +100,6 @@ def _turned(xyz: NDArray[np.float32], angle: float) -> NDArray[np.float32]:
     sine, cosine = np.sin(angle), np.cos(angle)
     turn = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]])
     return (xyz @ turn).astype(np.float32)
-
-
-def _behind(xyz: NDArray[np.float32], metres: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Points moved along their rays, float32 (N, 3)."""
-    ray = xyz / np.linalg.norm(xyz, axis=1, keepdims=True)
-    return (xyz + ray * metres[:, None]).astype(np.float32)
-
-
-def _across(xyz: NDArray[np.float32], metres: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Points moved aside and up, across their rays, float32 (N, 3)."""
-    ray = xyz / np.linalg.norm(xyz, axis=1, keepdims=True)
-    aside = np.cross([0, 0, 1], ray)
-    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
-    up = np.cross(ray, aside)
-    return (xyz + aside * metres[0][:, None] + up * metres[1][:, None]).astype(np.float32)
 
 
 if __name__ == "__main__":

@@ -47,7 +47,7 @@ class DerainingModule(MeasuredModule):
         RECIPE: Names of the arguments that say how it is trained and what is called rain. One that
             starts from another model keeps its own, and has the other's in place of all the rest.
         INTEGER_OPERATORS: What computes in eight bits in a model that is exported so; ONNX names.
-        channels: Names of its input channels, as :func:`channel_of` takes them.
+        channels: Names of its input channels, as :meth:`Scan.channel` takes them.
         network: The network itself.
         card: Data card of the data it is trained or tested on, once that is agreed with them.
         start: The trained model that its weights are of before it is trained; None where they are

@@ -1,4 +1,4 @@
-"""The model that comes with derain: each stage is trained once, and its threshold is chosen."""
+"""The model that comes with derain: it is trained once, and its threshold is chosen."""
 
 from pathlib import Path
 
@@ -6,12 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benchmarks import stages
-from benchmarks.make_default import MOST_LOST, MOST_TAKEN, chosen
-from benchmarks.stages import Stage, trained
+from benchmarks import make_default
+from benchmarks.make_default import MOST_LOST, MOST_TAKEN, chosen, trained
 from derain.errors import InputError
-
-STAGE = Stage("calm", Path("worlds/calm"), 8, 2, 3, 0.01)
 
 # Stands in for derain: writes the checkpoint that it is told to, and fails where broken.txt is.
 STAND_IN = """\
@@ -31,42 +28,30 @@ def calls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     stand_in, calls = tmp_path / "derain", tmp_path / "calls.txt"
     stand_in.write_text(STAND_IN.format(calls=calls, broken=tmp_path / "broken.txt"))
     stand_in.chmod(0o755)
-    monkeypatch.setattr(stages, "DERAIN", stand_in)
+    monkeypatch.setattr(make_default, "DERAIN", stand_in)
     return calls
 
 
-def test_a_stage_that_was_trained_is_not_trained_again(calls: Path, tmp_path: Path) -> None:
-    folder, start = tmp_path / "made", tmp_path / "start.ckpt"
-    checkpoint = trained(STAGE, folder, 7, start)
-    told = calls.read_text()
-    assert "--seed_everything 7 --data.root worlds/calm --data.campaign.world calm" in told
-    assert f"--start {start}" in told
+def test_a_training_that_ended_is_not_begun_again(calls: Path, tmp_path: Path) -> None:
+    training = tmp_path / "seed_7" / "training"
+    checkpoint = trained(tmp_path, training, 7)
+    called = calls.read_text()
+    assert "fit --config cues_worlds.yaml --seed_everything 7" in called
     assert checkpoint.read_text() == "trained\n"
-    assert trained(STAGE, folder, 7, start) == checkpoint
-    assert calls.read_text() == told
+    assert trained(tmp_path, training, 7) == checkpoint
+    assert calls.read_text() == called
 
 
 def test_a_training_that_did_not_end_is_begun_anew(calls: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "made"
+    training = tmp_path / "training"
     (tmp_path / "broken.txt").touch()
     with pytest.raises(InputError, match="derain fit failed"):
-        trained(STAGE, folder, 7)
-    (left,) = folder.rglob("last.ckpt")  # it failed, or was stopped, after an epoch
+        trained(tmp_path, training, 7)
+    (left,) = training.rglob("last.ckpt")  # it failed, or was stopped, after an epoch
     left.write_text("half\n")
     (tmp_path / "broken.txt").unlink()
-    assert trained(STAGE, folder, 7).read_text() == "trained\n"
+    assert trained(tmp_path, training, 7).read_text() == "trained\n"
     assert len(calls.read_text().splitlines()) == 2
-
-
-def test_the_training_of_another_seed_is_neither_taken_nor_lost(
-    calls: Path, tmp_path: Path
-) -> None:
-    folder = tmp_path / "made"
-    checkpoint = trained(STAGE, folder, 7)
-    with pytest.raises(InputError, match="training of another command"):
-        trained(STAGE, folder, 8)
-    assert checkpoint.exists()
-    assert len(calls.read_text().splitlines()) == 1
 
 
 shares = st.floats(0, 4 * MOST_TAKEN)

@@ -12,6 +12,7 @@ from derain.datamodules.scan_data import Loading, ScanData
 from derain.default import DEFAULT
 from derain.errors import InputError
 from derain.evaluation.counts import RANGE_EDGES, band_names, band_of, table_of
+from derain.example import EXAMPLE, Truth
 from derain.export.bench.bench import Bench, Effort, run_bench
 from derain.export.bench.bench_entries import bench_entries
 from derain.export.bench.labelled_frames import LabelledFrames
@@ -61,7 +62,7 @@ class DemoConfig:
         others: Methods that they are compared with.
         settings: Settings of every training, as :func:`derain.workflows.fit.fit` takes them.
         effort: How much is timed in the comparison.
-        scan: A scan of your own, or a folder of them; None for none.
+        scan: A scan of your own, or a folder of them; None for the example that comes with derain.
         columns: Names of the columns of its file, where that does not name them.
         workers: Processes of the simulation.
     """
@@ -88,9 +89,8 @@ class DemoConfig:
 
     @property
     def steps(self) -> int:
-        """How many there are: four once, two for each network, and one for each cleaning."""
-        cleanings = bool(self.networks) + (self.scan is not None)
-        return 4 + 2 * len(self.networks) + cleanings
+        """How many there are: five once, two for each network, and one where there are any."""
+        return 5 + 2 * len(self.networks) + bool(self.networks)
 
     def model(self, title: str) -> Path:
         """The ONNX file of a network."""
@@ -98,7 +98,7 @@ class DemoConfig:
 
 
 def run_demo(config: DemoConfig, show: Show = show_nothing) -> Bench:
-    """Simulates, tunes, trains, exports, cleans and compares.
+    """Cleans what is given, and then simulates, tunes, trains, exports, cleans and compares.
 
     Args:
         config: What is done.
@@ -111,6 +111,7 @@ def run_demo(config: DemoConfig, show: Show = show_nothing) -> Bench:
         InputError: What a step raises.
     """
     steps = Steps(show, config.steps)
+    clean_given_scans(config.scan or Path(EXAMPLE), config.columns, config.out / "yours", steps)
     steps.begin(f"Simulation: rain in {len(config.streets.names)} streets")
     simulate_track(config.data, config.streets, config.workers)
     steps.end(f"{len(config.streets.names) * config.streets.scans} scans in {config.data}")
@@ -125,8 +126,6 @@ def run_demo(config: DemoConfig, show: Show = show_nothing) -> Bench:
     found = _compare(config, data, steps)
     show(f"\n{main_table(found.rows, SHORT)}\n")
     show("Simulated rain on streets like those of the training is easy: real rain is not.")
-    if config.scan is not None:
-        clean_own_scans(config.scan, config.columns, config.out / "yours", steps)
     show(f"Done in {steps.elapsed}")
     return found
 
@@ -220,11 +219,13 @@ class Drawing(CleaningObserver):
 
     Attributes:
         by_range: Valid points by band of range and by whether they are removed, int64 (bands, 2).
+        truth: What of the rain of the example is found.
     """
 
     def __init__(self, file: Path, scan: str, heading: str) -> None:
         self.file = file
         self.by_range = np.zeros((len(RANGE_EDGES), 2), np.int64)
+        self.truth = Truth()
         self._scan, self._heading = scan, heading
         self._notices = Notices()
 
@@ -240,6 +241,8 @@ class Drawing(CleaningObserver):
         valid = judgement.scan.valid
         band, removed = band_of(judgement.scan.range[valid]), judgement.rain[valid]
         self.by_range += table_of((band, removed.astype(np.int64)), self.by_range.shape)
+        assert judgement.frame is not None
+        self.truth.add(judgement.frame.name, judgement.rain)
 
     def failed(self, error: InputError) -> None:
         """Warns of a scan that is left whole or cannot be read."""
@@ -256,11 +259,11 @@ class Drawing(CleaningObserver):
         )
 
 
-def clean_own_scans(scans: Path, columns: Sequence[str], out: Path, steps: Steps) -> CleanReport:
-    """Cleans your own scans by the model that comes with derain, with a picture of the first.
+def clean_given_scans(scans: Path, columns: Sequence[str], out: Path, steps: Steps) -> CleanReport:
+    """Cleans scans by the model that comes with derain, with a picture of the first.
 
     Args:
-        scans: A scan, or a folder of them.
+        scans: A scan, or a folder of them, or the example.
         columns: Names of the columns of files that do not name them.
         out: Folder of the clean scans and the picture.
         steps: Shows the step.
@@ -275,4 +278,6 @@ def clean_own_scans(scans: Path, columns: Sequence[str], out: Path, steps: Steps
     report = clean(source, load_method(DEFAULT, {}), out, observer=drawing)
     steps.end(f"{report}; before and after: {drawing.file}")
     steps.show(f"        removed by range: {drawing.shares}")
+    if drawing.truth.rain:
+        steps.show(f"        {drawing.truth}")
     return report

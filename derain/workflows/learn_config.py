@@ -11,17 +11,16 @@ from derain.files import DEFAULT_COLUMNS
 from derain.recordings.posed import ODOMETRY
 from derain.sources.source import Source
 from derain.spec import Spec
-from derain.views.channels import INTENSITY_RANK
 from derain.workflows.configurations import packaged_configs
 from derain.workflows.start import checkpoint_of
 
 PERSISTENCE = "persistence"
 
 # Networks that learn from labels, and the beginning of their configurations' names.
-STUDENTS = ("outdet", "salsanext", "salsanext_lite")
+STUDENTS = ("outdet", "salsanext", "salsanext_lite", "cues")
 
-# Channels by which a network sees intensity.
-SEE_INTENSITY = {"intensity", INTENSITY_RANK}
+# The network that weighs intensity as each scan shows it, and does without where it has none.
+CUES = "cues"
 
 # Channels of a network that is blind to intensity, as the option `--model.channels` takes them.
 BLIND = {"outdet": "[x,y,z]", "salsanext": "[range,x,y,z]", "salsanext_lite": "[range,x,y,z]"}
@@ -136,7 +135,10 @@ def student_of(config: LearnConfig, source: Source) -> Student:
     if config.start is None:
         network = config.model or STUDENTS[0]
         file, settings = _configuration(network)
-        if blind:
+        if network == CUES:
+            blind = False
+            _refuse_blind(config.blind, f"{CUES} weighs intensity, as each scan shows it")
+        elif blind:
             settings["model.channels"] = BLIND[network]
     else:
         spec = _spec_of_start(config, config.start)
@@ -146,7 +148,7 @@ def student_of(config: LearnConfig, source: Source) -> Student:
                 f"has no intensities, which {config.start} sees",
                 "Give a start that is blind to intensity, or none.",
             )
-        network, blind = spec.network, SEE_INTENSITY.isdisjoint(spec.channels)
+        network, blind = spec.network, not spec.weighs_intensity
         file, settings = _configuration(network)
         settings["start"] = config.start
     usual = yaml.safe_load(packaged_configs()[file].read_text("utf-8"))["trainer"]["max_epochs"]
@@ -171,13 +173,16 @@ def _spec_of_start(config: LearnConfig, start: str) -> Spec:
             f"{start} is of {spec.network}, from which {config.model} cannot start",
             f"Leave --model out, or give a start of {config.model}.",
         )
-    if config.blind and not SEE_INTENSITY.isdisjoint(spec.channels):
-        raise InputError(
-            "--blind",
-            f"{start} sees intensity, and so does a student that starts from it",
-            "Leave one of the two out, or give a start that is blind to intensity.",
-        )
+    if spec.weighs_intensity:
+        reason = f"{start} sees intensity, and so does a student that starts from it"
+        _refuse_blind(config.blind, reason)
     return spec
+
+
+def _refuse_blind(blind: bool, reason: str) -> None:
+    if blind:
+        remedy = "Leave it out, or learn by another network or from another start."
+        raise InputError("--blind", reason, remedy)
 
 
 def _configuration(network: str) -> tuple[str, dict[str, str]]:

@@ -1,65 +1,68 @@
 """Cues: what geometry and brightness each know of a point, weighed by one fusion."""
 
-from typing import Any, ClassVar, cast
+from collections.abc import Iterator, Sequence
+from typing import Any, ClassVar
 
 import torch
+from lightning.pytorch.utilities.types import OptimizerLRScheduler
 from torch import Tensor
 from torch.nn import functional
 
 from derain.errors import InputError
 from derain.learning.batch import Batch
-from derain.models.base import DerainingModule
-from derain.models.cues.network import AROUND, CuedNetwork
+from derain.models.cues.network import APART, CueNetwork
+from derain.models.one_cycle import one_cycle
 from derain.models.registry import NETWORKS
-from derain.models.relative_outdet.module import RelativeOutDet
-from derain.models.relative_outdet.network import (
-    RelativeOutDetNetwork,
-    both_logits,
-    without_carrier,
-)
-from derain.views.channels import INTENSITY_RANK
+from derain.models.relative_outdet.network import both_logits
+from derain.models.supervised import SupervisedModule
+from derain.scan import Scan
+from derain.views.isolated_points import CHANNELS, IsolatedPointView
+from derain.views.view import IGNORED, View
+
+# How much the answers of geometry and of each round count in the loss.
+WEIGHTS = (0.3, 0.3, 1.0)
 
 
-@NETWORKS.add("cued_outdet")
-class CuedOutDet(RelativeOutDet):
-    """Trains the fusion of cues, and the geometry beneath it.
+@NETWORKS.add("cues")
+class CueFusion(SupervisedModule):
+    """Trains the network of cues.
 
-    Geometry is judged by 3D-OutDet made relative, which sees no intensity. What its answers show of
-    rain's intensities in that very scan is the second cue, so that no unit, gain or sensor has to
-    be known.
+    Geometry judges without intensity. What its answers show of rain's intensities in that very
+    scan is the second cue, so that no unit, gain or sensor has to be known.
 
     Example:
         >>> trainer = Trainer(max_epochs=2, logger=False, enable_progress_bar=False)
         >>> data = derain.Folder(".", "wads", train=["scan.bin"], validation=["scan.bin"])
-        >>> model = CuedOutDet()
+        >>> model = CueFusion()
         >>> trainer.fit(model, data)
-        >>> model.spec.channels
-        ('x', 'y', 'z', 'intensity_rank')
+        >>> model.spec.view
+        {'kind': 'isolated_points', 'neighbours': 9}
 
     Args:
         neighbours: k, the size of a neighbourhood, the point itself included; at least 9.
-        width: Features of a point, as geometry sees it.
+        width: Features of a point.
         of_neighbour: Features of each neighbour, of where it is.
         opinion: What a point tells those that it is a neighbour of.
-        context: Features of what a scan holds at some range; 0 leaves that out.
+        context: Features of what a scan holds at some range.
         fusion: Features of a point in the layers that weigh the cues.
-        geometry_share: How quickly geometry learns, as a share of the learning rate; 0 leaves it as
-            it is, which asks for a start from a trained model.
+        without_intensity: Added to the log-odds of scans without intensities; chosen after the
+            training.
         learning_rate: Of AdamW, where it is highest.
         weight_decay: Of AdamW.
+        final_share: How much of the learning rate is left at the end; above 0 where weights are
+            averaged over the last part of the training.
         threshold: A point is rain where its probability is greater.
-        balance: How far the rarer class counts for more, in geometry: 0 not at all, 1 by the
-            inverse of its share.
+        balance: How far the rarer class counts for more: 0 not at all, so that a point wrongly
+            called rain counts for no less than one that is missed; 1 by the inverse of its share.
         spec: Set by derain when it saves a checkpoint; leave it out otherwise.
 
     Raises:
         InputError: Fewer than 9 neighbours.
     """
 
-    CHANNELS: ClassVar[tuple[str, ...]] = (*RelativeOutDet.CHANNELS, INTENSITY_RANK)
-    MERGED: ClassVar[bool] = True
-    RECIPE: ClassVar[tuple[str, ...]] = (*RelativeOutDet.RECIPE, "geometry_share")
-    network: CuedNetwork  # type: ignore[assignment]
+    VIEW: ClassVar[type[View]] = IsolatedPointView
+    RECIPE: ClassVar[tuple[str, ...]] = (*SupervisedModule.RECIPE, "final_share")
+    network: CueNetwork
 
     def __init__(
         self,
@@ -69,61 +72,72 @@ class CuedOutDet(RelativeOutDet):
         opinion: int = 12,
         context: int = 16,
         fusion: int = 48,
-        geometry_share: float = 1.0,
+        without_intensity: float = 0.0,
         learning_rate: float = 5e-3,
         weight_decay: float = 1e-4,
+        final_share: float = 0.0,
         threshold: float = 0.5,
         balance: float = 0.0,
         spec: dict[str, Any] | None = None,
     ) -> None:
-        super().__init__(neighbours, width, of_neighbour, opinion, context)
-        if neighbours <= AROUND:
-            raise InputError(
-                "neighbours", f"{neighbours} are too few", f"Give {AROUND + 1} or more."
-            )
+        super().__init__(CHANNELS)
+        if neighbours <= APART[-1]:
+            reason, remedy = f"{neighbours} are too few", f"Give {APART[-1] + 1} or more."
+            raise InputError("neighbours", reason, remedy)
         self.save_hyperparameters()
-        geometry = cast(RelativeOutDetNetwork, self.network)
-        self.network = CuedNetwork(geometry, fusion)
+        self.network = CueNetwork(
+            neighbours, width, of_neighbour, opinion, context, fusion, without_intensity
+        )
         self.adopt(spec)
 
-    def begin_from(self, source: DerainingModule) -> None:
-        """Takes over the weights of a trained model, or of its geometry from one that has no more.
+    def view_for(self, scans: Sequence[Scan]) -> IsolatedPointView:
+        """The view that the network sees a scan through, whatever the scans."""
+        return IsolatedPointView(self.hparams["neighbours"])
 
-        Raises:
-            InputError: A model of another network.
-        """
-        if type(source) is RelativeOutDet:
-            self.network.geometry.load_state_dict(source.network.state_dict())
-        else:
-            super().begin_from(source)
+    def accepts_view(self, view: View) -> bool:
+        """Whether the network can take what a Spec's view gives: as many neighbours."""
+        return isinstance(view, IsolatedPointView) and view.neighbours == self.hparams["neighbours"]
+
+    def forward(self, **inputs: Tensor) -> Tensor:
+        """Logits, float (S, 2), of one scan; inputs as for :class:`CueNetwork`."""
+        return self.network(**inputs)
+
+    def logits_of(self, batch: Batch) -> Tensor:
+        """Logits of every isolated point, float (S, 2), scan by scan: each has its own context."""
+        return both_logits(self._answers(batch)[-1])
 
     def losses(self, batch: Batch) -> tuple[dict[str, Tensor], Tensor]:
-        """Loss of geometry and of the rounds of the fusion, and the logits of the last round."""
+        """Loss of geometry and of each round of the fusion, and the logits of the last round."""
         assert batch.target is not None  # the data modules pair these scans with labels
-        geometry_learns = self.hparams["geometry_share"] > 0
-        seen, answers = [], []
-        for points, distances, neighbours in self.scans_of(batch):
-            with torch.set_grad_enabled(torch.is_grad_enabled() and geometry_learns):
-                rain, far = self.network.geometry.rain_and_range(
-                    points[:, :3], distances, neighbours
-                )
-            given = without_carrier(rain, far).detach()
-            seen.append(rain)
-            answers.append(
-                torch.stack(self.network.fused(given, points, distances, neighbours), dim=1)
-            )
-        of_rounds = torch.cat(answers)
-        target = batch.target[:, None].expand_as(of_rounds).to(of_rounds.dtype)
-        fusion = functional.binary_cross_entropy_with_logits(of_rounds, target)
-        geometry = self.segmentation_loss(both_logits(torch.cat(seen)), batch.target).total
-        loss = fusion + geometry if geometry_learns else fusion
-        losses = {"loss": loss, "geometry": geometry, "fusion": fusion}
-        return losses, both_logits(of_rounds[:, -1])
+        answers, judged = self._answers(batch), batch.target != IGNORED
+        target = batch.target[judged].to(answers[0].dtype)
+        weight = self.class_weight[batch.target[judged]]
+        each = [
+            functional.binary_cross_entropy_with_logits(answer[judged], target, weight)
+            for answer in answers
+        ]
+        loss = torch.stack([share * one for share, one in zip(WEIGHTS, each, strict=True)]).sum()
+        losses = {"loss": loss, "geometry": each[0], "fusion": each[-1]}
+        return losses, both_logits(answers[-1])
 
-    def parameter_groups(self) -> list[dict[str, Any]]:
-        """Geometry, which learns more slowly or not at all, and the fusion."""
-        rate, share = self.hparams["learning_rate"], self.hparams["geometry_share"]
-        fusion = {"params": self.network.rounds.parameters(), "lr": rate}
-        if share == 0:
-            return [fusion]
-        return [fusion, {"params": self.network.geometry.parameters(), "lr": share * rate}]
+    def deployed(self) -> CueNetwork:
+        """The network as it is exported."""
+        return self.network
+
+    def configure_optimizers(self) -> OptimizerLRScheduler:
+        """AdamW with a learning rate that rises and falls once in the whole training."""
+        return one_cycle(self, self.hparams["final_share"])
+
+    def _answers(self, batch: Batch) -> list[Tensor]:
+        """Log-odds of rain by geometry and after each round, float (S,) each, of all scans."""
+        of_scans = [self.network.answers(**scan) for scan in _scans_of(batch)]
+        return [torch.cat(answers) for answers in zip(*of_scans, strict=True)]
+
+
+def _scans_of(batch: Batch) -> Iterator[dict[str, Tensor]]:
+    """What the network takes of each scan of a batch; all of them share the points."""
+    shared = {name: batch.inputs[name] for name in ("points", "cell")}
+    split = {name: batch.split(batch.inputs[name]) for name in ("distances", "neighbours")}
+    for scan in range(len(batch.cells)):
+        own = {name: batch.inputs[name][scan] for name in ("step", "counts")}
+        yield shared | own | {name: parts[scan] for name, parts in split.items()}

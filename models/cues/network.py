@@ -1,25 +1,28 @@
 """The network: geometry, then brightness as the scan itself calibrates it, weighed together."""
 
+from collections.abc import Sequence
+
 import torch
 from torch import Tensor, nn
-from torch.nn import functional
 
-from derain.models.cues.brightness import Histograms
-from derain.models.relative_outdet.network import RelativeOutDetNetwork, both_logits
-from derain.models.relative_outdet.steps import NEAREST_POINT
+from derain.models.cues.beams import in_steps, taken
+from derain.models.cues.brightness import calibrated
+from derain.models.cues.geometry import Geometry
+from derain.models.layers.across_features import AcrossFeatures
+from derain.models.layers.steps import NEAREST_POINT, USUAL_RANGE
+from derain.models.relative_outdet.network import both_logits
+from derain.views.intensity_rank import INTENSITY_RANKS
 
-# Log-odds beyond this are as good as certain.
-CERTAIN = 12.0
+# Log-odds are cut to this either way; those of crowded neighbours are taken to be the second.
+CERTAIN, OF_CROWDED = 12.0, -8.0
 
 # Points of lower log-odds by geometry, that is of a probability below 1 in 150, keep its answer:
-# hardly any of them is rain, and most points of a scan need not be weighed.
+# hardly any of them is rain, and most points need not be weighed.
 # Source: modelling choice.
 DOUBTFUL = -5.0
 
-# Neighbours whose cues the fusion weighs, the point itself not counted, and those of them whose
-# distances it weighs.
-AROUND = 8
-APART = (1, 3, AROUND)
+# Numbers of the neighbours whose distances the fusion weighs; 0 is the point itself.
+APART = (1, 3, 8)
 
 # Distances below this share of the range are not told apart.
 NEAREST_APART = 1e-4
@@ -29,136 +32,196 @@ NEAREST_APART = 1e-4
 SHARE_ADDED = 0.5
 ROUNDS = 2
 
-# Numbers of a point that the fusion weighs.
-NUMBERS = 19
+# Numbers of a point that a fusion weighs besides the features of geometry.
+CUE_NUMBERS = 19
 
 
-class CuedNetwork(nn.Module):
-    """The network, from points of one scan to logits.
+class CueNetwork(nn.Module):
+    """The network, from the isolated points of one scan to logits.
 
     A first pass sees geometry alone. Its probabilities calibrate the cue of brightness, and a
     fusion weighs both, of the point and of its neighbours. A second round does so again, from the
     answers of the first.
 
     Example:
-        >>> network = CuedNetwork(RelativeOutDetNetwork(neighbours=9)).eval()
-        >>> points, distances = torch.rand(20, 4), torch.rand(20, 9)
-        >>> neighbours = torch.arange(20)[:, None] * torch.ones(1, 9, dtype=torch.int64)
-        >>> network(points, distances, neighbours).shape
-        torch.Size([20, 2])
+        >>> seen = derain.CueFusion().view_for([])(derain.read_scan("scan.bin"))
+        >>> inputs = {name: torch.from_numpy(array) for name, array in seen.inputs().items()}
+        >>> derain.CueNetwork()(**inputs).shape == (seen.size, 2)
+        True
 
     Args:
-        geometry: Scores points by where they and their neighbours are.
-        width: Features of a point in the two hidden layers of a fusion.
+        neighbours: k, the size of a neighbourhood, the point itself included; at least 9.
+        width: Features of a point.
+        of_neighbour: Features of each neighbour, of where it is.
+        opinion: What a point tells those that it is a neighbour of.
+        context: Features of what a scan holds at some range.
+        fusion: Features of a point in the two hidden layers of a fusion.
+        without_intensity: Added to the log-odds of a scan whose intensities are not known or all
+            the same: geometry alone is less sure of rain than both cues are.
     """
 
-    def __init__(self, geometry: RelativeOutDetNetwork, width: int = 48) -> None:
+    def __init__(
+        self,
+        neighbours: int = 9,
+        width: int = 32,
+        of_neighbour: int = 8,
+        opinion: int = 12,
+        context: int = 16,
+        fusion: int = 48,
+        without_intensity: float = 0.0,
+    ) -> None:
         super().__init__()
-        self.geometry = geometry
-        self.rounds = nn.ModuleList(_fusion(width) for _ in range(ROUNDS))
+        self.without_intensity = without_intensity
+        self.geometry = Geometry(neighbours, width, of_neighbour, opinion, context)
+        self.rounds = nn.ModuleList(_fusion(CUE_NUMBERS + width, fusion) for _ in range(ROUNDS))
 
-    def forward(self, points: Tensor, distances: Tensor, neighbours: Tensor) -> Tensor:
-        """Scores every point of a scan.
+    def forward(
+        self,
+        points: Tensor,
+        cell: Tensor,
+        distances: Tensor,
+        neighbours: Tensor,
+        step: Tensor,
+        counts: Tensor,
+    ) -> Tensor:
+        """Scores every isolated point of a scan.
 
         Args:
-            points: x, y, z in metres, in the sensor's frame, and the rank of intensity, float
-                (M, 4).
-            distances: Distances to the neighbours in metres, float (M, k), ascending.
-            neighbours: The point itself, then its neighbours, as rows of ``points``, int64 (M, k).
+            points: x, y, z in metres, in the sensor's frame, float (M, 3).
+            cell: Shell and rank of intensity of each point, int64 (M,).
+            distances: Distances to the neighbours in metres, float (S, k), ascending.
+            neighbours: Of each isolated point itself, then its neighbours, as rows of ``points``,
+                int64 (S, k).
+            step: Angle between neighbouring beams, radians, float (1,).
+            counts: Points of the scan by shell and rank, float (1, SHELLS, INTENSITY_RANKS).
 
         Returns:
-            Logits of "not rain" and "rain", float (M, 2).
+            Logits of "not rain" and "rain", float (S, 2).
         """
-        rain = self.geometry(points[:, :3], distances, neighbours)[:, 1]
-        return both_logits(self.fused(rain, points, distances, neighbours)[-1])
+        rain = self.answers(points, cell, distances, neighbours, step[0], counts[0])[-1]
+        return both_logits(rain)
 
-    def fused(
-        self, rain: Tensor, points: Tensor, distances: Tensor, neighbours: Tensor
-    ) -> list[Tensor]:
-        """Log-odds of rain after each round, float (M,).
+    def answers(
+        self,
+        points: Tensor,
+        cell: Tensor,
+        distances: Tensor,
+        neighbours: Tensor,
+        step: Tensor,
+        counts: Tensor,
+    ) -> Sequence[Tensor]:
+        """Log-odds of rain by geometry, and after each round, float (S,) each.
 
-        Gradients do not pass from one round to the one before it.
-
-        Args:
-            rain: Log-odds of rain by geometry, float (M,).
-            points: As of :meth:`forward`.
-            distances: As of :meth:`forward`.
-            neighbours: As of :meth:`forward`.
+        Gradients do not pass from the cues to the answers that they come from. Arguments are as of
+        :meth:`forward`, of one scan: step float (), counts float (SHELLS, INTENSITY_RANKS).
         """
+        distances, neighbours = distances.T, neighbours.T
+        seen, far = in_steps(points, distances, neighbours, step)
+        others = _numbers(neighbours, points.shape[0])
+        features, rain = self.geometry(seen, far, others, counts)
         doubtful = torch.nonzero(rain > DOUBTFUL)[:, 0]
-        cues, answers = Cues(points, distances, neighbours, doubtful), []
+        cues = Cues(far, cell, distances, neighbours, others, counts, doubtful)
+        answers, features = [rain], features.index_select(1, doubtful)
         for fusion in self.rounds:
             with torch.no_grad():
-                given = cues.around(rain)
-            rain = rain.scatter(0, doubtful, fusion(given)[:, 0])
-            answers.append(rain)
-        return answers
+                given = cues.around(answers[-1])
+            weighed = fusion(torch.cat([given, features]))[0]
+            answers.append(rain.scatter(0, doubtful, weighed))
+        unknown = (counts[:, 1:].sum() == 0).to(rain.dtype)
+        return [answer + self.without_intensity * unknown for answer in answers]
 
 
-def _fusion(width: int) -> nn.Module:
-    """Weighs the numbers of each point, float (M, NUMBERS); log-odds of rain, float (M, 1)."""
+def _numbers(neighbours: Tensor, points: int) -> Tensor:
+    """Neighbours as numbers of isolated points, S where they are crowded, int64 (k, S)."""
+    isolated = neighbours[0]
+    numbers = torch.full((points,), isolated.shape[0], device=isolated.device)
+    numbers = numbers.scatter(0, isolated, torch.arange(isolated.shape[0], device=isolated.device))
+    return taken(numbers, neighbours)
+
+
+def _fusion(given: int, width: int) -> nn.Module:
+    """Weighs the numbers of each point, float (given, D); log-odds of rain, float (1, D)."""
     return nn.Sequential(
-        nn.Linear(NUMBERS, width),
+        AcrossFeatures(given, width),
         nn.ReLU(),
-        nn.Linear(width, width),
+        AcrossFeatures(width, width),
         nn.ReLU(),
-        nn.Linear(width, 1),
+        AcrossFeatures(width, 1),
     )
 
 
 class Cues:
-    """What is known of a scan's points, apart from how likely they are rain.
+    """What is known of a scan's points of which geometry leaves doubt, and of their neighbours.
 
     Args:
-        points: x, y, z in metres, in the sensor's frame, and the rank of intensity, float (M, 4).
-        distances: Distances to the neighbours in metres, float (M, k), ascending.
-        neighbours: The point itself, then its neighbours, as rows of ``points``, int64 (M, k).
-        rows: Points that are weighed, int64 (S,).
+        far: Logarithms of the ranges of S isolated points, float (S,).
+        cell: Shell and rank of intensity of M points, int64 (M,).
+        distances: Distances to the neighbours, metres, float (k, S).
+        neighbours: int64 (k, S), into the M points.
+        others: The same as numbers of isolated points, S where they are crowded.
+        counts: Points of the scan by shell and rank, float (SHELLS, INTENSITY_RANKS).
+        doubtful: Isolated points that are weighed, int64 (D,).
     """
 
-    def __init__(self, points: Tensor, distances: Tensor, neighbours: Tensor, rows: Tensor) -> None:
-        distance = points[:, :3].square().sum(1).sqrt().clamp_min(NEAREST_POINT)
-        log_range = torch.log(distance)
-        self._histograms = Histograms(log_range, points[:, 3])
-        apart = distances[rows][:, APART] / distance[rows][:, None]
+    def __init__(
+        self,
+        far: Tensor,
+        cell: Tensor,
+        distances: Tensor,
+        neighbours: Tensor,
+        others: Tensor,
+        counts: Tensor,
+        doubtful: Tensor,
+    ) -> None:
+        self._counts, self._doubtful = counts, doubtful
+        self._cell_of_isolated = cell.index_select(0, neighbours[0])
+        self._cell = taken(self._cell_of_isolated, doubtful)
+        around = slice(1, APART[-1] + 1)
+        self._others = others[around].index_select(1, doubtful)
+        self._cell_of_others = taken(cell, neighbours[around].index_select(1, doubtful))
         # Shifted and scaled, here and below, so that all numbers are of the order of 1.
-        self._places = torch.cat(
-            [
-                (log_range[rows] - 2)[:, None],
-                torch.log(apart + NEAREST_APART) + 4,
-                points[rows][:, 3:],
-            ],
-            dim=1,
+        far = taken(far, doubtful)
+        apart = distances[APART, :].index_select(1, doubtful) / (USUAL_RANGE * far.exp()).clamp_min(
+            NEAREST_POINT
         )
-        self._neighbours = neighbours[rows][:, 1 : AROUND + 1]
-        self._rows = rows
+        rank = (self._cell % INTENSITY_RANKS).to(far.dtype) / (INTENSITY_RANKS - 1)
+        self._places = torch.cat(
+            [(far + 0.3)[None], torch.log(apart + NEAREST_APART) + 4, rank[None]]
+        )
 
     def around(self, rain: Tensor) -> Tensor:
-        """The cues of each point that is weighed and of its neighbours, float (S, NUMBERS).
+        """The cues of each doubtful point and of its neighbours, float (CUE_NUMBERS, D).
 
         Args:
-            rain: Log-odds of rain, float (M,), which calibrate the cue of brightness.
+            rain: Log-odds of rain of the isolated points, float (S,), which calibrate the cue of
+                brightness.
         """
         rain = rain.clamp(-CERTAIN, CERTAIN)
-        rows, shell, cell = self._rows, self._histograms.shell, self._histograms.cell
-        own = rain[rows]
-        first = self._histograms.brightness(rows, own.sigmoid())
-        first_odds = first.log_odds[cell[rows]]
-        second = self._histograms.brightness(rows, (own + SHARE_ADDED * first_odds).sigmoid())
-        given = torch.stack([rain / 4, second.log_odds[cell] / 2, rain.sigmoid()], dim=1)
-        of_neighbours = functional.embedding(self._neighbours, given)
-        of_shell = torch.stack([torch.log1p(second.rain) / 4, second.separation, second.share], 1)
-        of_scan = torch.log1p(own.sigmoid().double().sum()).to(rain.dtype) / 4
-        return torch.cat(
+        cell = self._cell_of_isolated
+        first = calibrated(self._counts, cell, rain.sigmoid()).log_odds
+        second = calibrated(self._counts, cell, (rain + SHARE_ADDED * taken(first, cell)).sigmoid())
+        own = taken(rain, self._doubtful)
+        of_all = torch.cat([rain, rain.new_full((1,), OF_CROWDED)])
+        of_others = taken(of_all, self._others)
+        brightness = taken(second.log_odds, self._cell_of_others)
+        shell = torch.div(self._cell, INTENSITY_RANKS, rounding_mode="floor")
+        of_scan = torch.log1p(rain.sigmoid().double().sum()).to(rain.dtype)
+        return torch.stack(
             [
-                given[rows][:, :2],
-                (first_odds / 2)[:, None],
-                of_neighbours.mean(dim=1),
-                of_neighbours[:, :, :2].amax(dim=1),
-                of_neighbours[:, :, :2].amin(dim=1),
-                of_shell[shell[rows]],
-                of_scan.expand_as(own)[:, None],
-                self._places,
-            ],
-            dim=1,
+                own / 4,
+                taken(second.log_odds, self._cell) / 2,
+                taken(first, self._cell) / 2,
+                of_others.mean(dim=0) / 4,
+                brightness.mean(dim=0) / 2,
+                of_others.sigmoid().mean(dim=0),
+                of_others.amax(dim=0) / 4,
+                brightness.amax(dim=0) / 2,
+                of_others.amin(dim=0) / 4,
+                brightness.amin(dim=0) / 2,
+                taken(torch.log1p(second.rain), shell) / 4,
+                taken(second.separation, shell),
+                taken(second.share, shell),
+                (of_scan / 4).expand_as(own),
+                *self._places,
+            ]
         )

@@ -18,6 +18,7 @@ from torch import Tensor
 
 from derain.errors import InputError
 from derain.learning.batch import Batch
+from derain.models.one_cycle import one_cycle
 from derain.models.registry import NETWORKS
 from derain.models.relative_outdet.network import RelativeOutDetNetwork
 from derain.models.relative_outdet.steps import STEP_NEIGHBOUR
@@ -25,9 +26,6 @@ from derain.models.supervised import SupervisedModule
 from derain.scan import Scan
 from derain.views.neighbours import NeighbourView
 from derain.views.view import View
-
-# Share of the training in which the learning rate rises; then it falls to nothing.
-WARM_UP_SHARE = 0.1
 
 
 @NETWORKS.add("relative_outdet")
@@ -59,8 +57,6 @@ class RelativeOutDet(SupervisedModule):
     VIEW: ClassVar[type[View]] = NeighbourView
     # What the view gives it of a point; the network takes from it what does not differ.
     CHANNELS: ClassVar[tuple[str, ...]] = ("x", "y", "z")
-    # Whether points that are one return, written more than once, are one point.
-    MERGED: ClassVar[bool] = False
     network: RelativeOutDetNetwork
 
     def __init__(
@@ -86,7 +82,7 @@ class RelativeOutDet(SupervisedModule):
 
     def view_for(self, scans: Sequence[Scan]) -> NeighbourView:
         """The view that the network sees a scan through, whatever the scans."""
-        return NeighbourView(self.hparams["neighbours"], self.channels, merged=self.MERGED)
+        return NeighbourView(self.hparams["neighbours"], self.channels)
 
     def accepts_view(self, view: View) -> bool:
         """Whether the network can take what a Spec's view gives: all points, and its neighbours."""
@@ -94,7 +90,6 @@ class RelativeOutDet(SupervisedModule):
             isinstance(view, NeighbourView)
             and view.neighbours == self.hparams["neighbours"]
             and view.candidates is None
-            and view.merged == self.MERGED
         )
 
     def forward(self, points: Tensor, distances: Tensor, neighbours: Tensor) -> Tensor:
@@ -103,18 +98,7 @@ class RelativeOutDet(SupervisedModule):
 
     def logits_of(self, batch: Batch) -> Tensor:
         """Logits of every cell, float (M, 2), scan by scan: each has a context of its own."""
-        return torch.cat([self(*scan) for scan in self.scans_of(batch)])
-
-    def scans_of(self, batch: Batch) -> Iterator[tuple[Tensor, Tensor, Tensor]]:
-        """Points, distances and neighbours of each scan of a batch."""
-        begin = 0
-        for cells in batch.cells:
-            points, distances, neighbours = (
-                batch.inputs[name][begin : begin + cells]
-                for name in ("points", "distances", "neighbours")
-            )
-            yield points, distances, neighbours - begin
-            begin += cells
+        return torch.cat([self(*scan) for scan in _scans_of(batch)])
 
     def deployed(self) -> RelativeOutDetNetwork:
         """The network as it is exported."""
@@ -122,16 +106,16 @@ class RelativeOutDet(SupervisedModule):
 
     def configure_optimizers(self) -> OptimizerLRScheduler:
         """AdamW with a learning rate that rises and falls once in the whole training."""
-        groups = self.parameter_groups()
-        optimizer = torch.optim.AdamW(groups, weight_decay=self.hparams["weight_decay"])
-        schedule = torch.optim.lr_scheduler.OneCycleLR(
-            optimizer,
-            [group["lr"] for group in groups],
-            total_steps=max(int(self.trainer.estimated_stepping_batches), 2),
-            pct_start=WARM_UP_SHARE,
-        )
-        return {"optimizer": optimizer, "lr_scheduler": {"scheduler": schedule, "interval": "step"}}
+        return one_cycle(self)
 
-    def parameter_groups(self) -> list[dict[str, Any]]:
-        """What is trained, and the highest rate that it learns at."""
-        return [{"params": self.parameters(), "lr": self.hparams["learning_rate"]}]
+
+def _scans_of(batch: Batch) -> Iterator[tuple[Tensor, Tensor, Tensor]]:
+    """Points, distances and neighbours of each scan of a batch."""
+    begin = 0
+    for cells in batch.cells:
+        points, distances, neighbours = (
+            batch.inputs[name][begin : begin + cells]
+            for name in ("points", "distances", "neighbours")
+        )
+        yield points, distances, neighbours - begin
+        begin += cells

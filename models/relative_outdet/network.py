@@ -6,7 +6,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from derain.models.relative_outdet.steps import EPSILON, NUMBERS, USUAL_RANGE, in_steps
+from derain.models.layers.steps import NEIGHBOUR_NUMBERS, USUAL_RANGE
+from derain.models.relative_outdet.steps import EPSILON, in_steps
 
 # Slope of every activation below 0.
 NEGATIVE_SLOPE = 0.1
@@ -63,7 +64,7 @@ class RelativeOutDetNetwork(nn.Module):
         context: int = 16,
     ) -> None:
         super().__init__()
-        self.neighbour = nn.Linear(NUMBERS, of_neighbour)
+        self.neighbour = nn.Linear(NEIGHBOUR_NUMBERS, of_neighbour)
         self.neighbourhood = nn.Linear((neighbours - 1) * of_neighbour + 1, width)
         self.has_context = context > 0
         if self.has_context:

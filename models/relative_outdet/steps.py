@@ -4,10 +4,15 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-# Nothing is measured nearer than this, metres, nor right above the sensor; both keep every
-# division finite.
-NEAREST_POINT = 0.05
-NEAREST_TO_AXIS = 0.01
+from derain.models.layers.steps import (
+    FARTHEST_IN_STEPS,
+    NEAREST_POINT,
+    NEAREST_TO_AXIS,
+    STEP_EPSILON,
+    USUAL_RANGE,
+    asinh,
+    farther_by,
+)
 
 # A step is the angle to the third nearest beam among those of a point's neighbours. Two of the
 # nearest lie on either side, along the axis of finer resolution, and another return of the point's
@@ -22,18 +27,8 @@ SAMPLED_POINTS = 32769
 # Radians; no sensor's beams lie closer together.
 FINEST_ANGLE = 1e-4
 
-# Added to what logarithms are taken of, and to what is divided by: either may be 0.
-STEP_EPSILON = 1e-2
+# Added to what is divided by, which may be 0.
 EPSILON = 1e-3
-
-# Ranges are logarithms over this one, metres.
-USUAL_RANGE = 10.0
-
-# However far a neighbour is, no number that says so is greater.
-FARTHEST_IN_STEPS = 10.0
-
-# How many numbers say where a neighbour is.
-NUMBERS = 4
 
 
 def in_steps(points: Tensor, distances: Tensor, neighbours: Tensor) -> tuple[Tensor, Tensor]:
@@ -64,43 +59,19 @@ def in_steps(points: Tensor, distances: Tensor, neighbours: Tensor) -> tuple[Ten
     outwards = level_dot / level[:, None]
     aside = (x[:, None] * left - y[:, None] * ahead) / level[:, None]
     risen = (level[:, None] * up - z[:, None] * outwards) / distance[:, None]
-    farther = _farther(distance[:, None], level_dot + z[:, None] * up, distances[:, 1:])
+    farther = farther_by(distance[:, None], level_dot + z[:, None] * up, distances[:, 1:])
     step = _step(aside, risen, distance)
     length = (distance * step)[:, None]
     seen = torch.stack(
         [
             torch.log(distances[:, 1:] / length + STEP_EPSILON),
-            _asinh(farther / length),
-            _asinh(aside.abs() / length),
-            _asinh(risen / length),
+            asinh(farther / length),
+            asinh(aside.abs() / length),
+            asinh(risen / length),
         ],
         dim=2,
     )
     return seen.clamp(-FARTHEST_IN_STEPS, FARTHEST_IN_STEPS), torch.log(distance / USUAL_RANGE)
-
-
-def _asinh(steps: Tensor) -> Tensor:
-    """The inverse hyperbolic sine, by a logarithm: onnxruntime's own is many times slower."""
-    size = steps.abs()
-    return torch.sign(steps) * torch.log(size + (size * size + 1).sqrt())
-
-
-def _farther(distance: Tensor, dot: Tensor, apart: Tensor) -> Tensor:
-    """How much farther neighbours are from the sensor: a difference of squares by the sum.
-
-    The difference of two ranges would leave the rounding of both, which where beams lie close is no
-    small part of a step.
-
-    Args:
-        distance: Ranges of the points, metres, float (M, 1).
-        dot: Products of the points with the offsets of their neighbours, float (M, k - 1).
-        apart: How far those are from the points, metres, float (M, k - 1).
-
-    Returns:
-        Metres, float (M, k - 1).
-    """
-    squares = 2 * dot + apart * apart
-    return squares / ((distance * distance + squares).clamp_min(0).sqrt() + distance)
 
 
 def _step(aside: Tensor, risen: Tensor, distance: Tensor) -> Tensor:

@@ -49,9 +49,9 @@ def test_the_file_is_that_of_the_card_and_small() -> None:
     assert card.name == DEFAULT
 
 
-def test_it_sees_neighbours_and_no_intensity() -> None:
+def test_it_sees_isolated_points_and_no_unit_of_intensity() -> None:
     spec = derain.Derainer(threads=1).spec
-    assert spec.view["kind"] == "neighbours"
+    assert spec.view["kind"] == "isolated_points"
     assert "intensity" not in spec.channels
 
 

@@ -4,7 +4,7 @@ import pytest
 
 from derain.errors import InputError
 from derain.models.base import DerainingModule
-from derain.models.cues import CuedOutDet
+from derain.models.cues import CueFusion
 from derain.models.lisnownet import LiSnowNet
 from derain.models.outdet import OutDet
 from derain.models.published import Published
@@ -18,7 +18,7 @@ def test_derain_has_these_networks_and_each_knows_its_name() -> None:
     assert dict(NETWORKS) == {
         "lisnownet": LiSnowNet,
         "outdet": OutDet,
-        "cued_outdet": CuedOutDet,
+        "cues": CueFusion,
         "relative_outdet": RelativeOutDet,
         "salsanext": SalsaNext,
         "salsanext_lite": SalsaNextLite,

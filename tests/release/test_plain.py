@@ -215,4 +215,4 @@ def test_python_is_told_which_extra_brings_a_name(plain: Any) -> None:
     for line in (wads, outdet):
         assert line.endswith("which is not installed. pip install 'derain[train]'")
     assert wads.startswith("derain.Wads: needs ")
-    assert network == "relative_outdet"
+    assert network == "cues"

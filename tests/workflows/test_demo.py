@@ -19,7 +19,7 @@ from derain.files import DEFAULT_COLUMNS, read_scan
 from derain.scan import Scan
 from derain.simulation.campaign import Campaign
 from derain.system.open3d_import import import_open3d
-from derain.workflows.demo import DemoConfig, clean_own_scans, run_demo
+from derain.workflows.demo import DemoConfig, clean_given_scans, run_demo
 from derain.workflows.steps import Steps
 
 
@@ -51,7 +51,7 @@ def test_every_step_is_shown_and_leaves_its_files(small: DemoConfig) -> None:
     bench = run_demo(small, lines.append)
     steps = [line.partition(":")[0] for line in lines if re.match(r"[A-Z]\w+: ", line)]
     of_network = ["Training", "Export", "Cleaning"]
-    assert steps == ["Simulation", "Tuning", "Picture", *of_network, "Comparison"]
+    assert steps == ["Cleaning", "Simulation", "Tuning", "Picture", *of_network, "Comparison"]
     assert any(line.endswith(f"(step {len(steps)} of {len(steps)})") for line in lines)
     times = [line for line in lines if re.match(r"  \d+:\d\d  \S", line)]
     assert len(times) == len(steps)
@@ -63,7 +63,13 @@ def test_every_step_is_shown_and_leaves_its_files(small: DemoConfig) -> None:
     assert [row.split("|")[1].strip() for row in table[3:]] == titles
 
     out = small.out
-    for picture in ("filters.png", "before_after.png", "bench/speed_error.png"):
+    assert any("points are rain or snow" in line for line in lines)
+    for picture in (
+        "yours/before_after.png",
+        "filters.png",
+        "before_after.png",
+        "bench/speed_error.png",
+    ):
         assert imread(out / picture)[..., :3].std() > 0
     (scan,) = (out / "simulated/sequences/002/lidar_radar_pcd").glob("*.bin")
     rain = np.fromfile(out / "cleaned" / f"{scan.stem}.label", "<u4") == 1
@@ -79,12 +85,12 @@ def test_the_model_that_comes_with_derain_cleans_your_own_scans(
     mine.mkdir()
     for number in range(2):
         scene(500, number).tofile(mine / f"{number}.bin")
-    np.full((60, 4), 1e5, np.float32).tofile(mine / "far.bin")
+    (mine / "cut.bin").write_bytes(b"12345")
     out, lines = tmp_path / "out", []
-    report = clean_own_scans(mine, DEFAULT_COLUMNS, out, Steps(lines.append, 1))
+    report = clean_given_scans(mine, DEFAULT_COLUMNS, out, Steps(lines.append, 1))
     assert sum(scan.points for scan in report.scans) == 1000
-    assert [Path(error.subject).name for error in report.failures] == ["far.bin"]
-    assert "far.bin: left whole" in capsys.readouterr().err
+    assert [Path(error.subject).name for error in report.failures] == ["cut.bin"]
+    assert "cut.bin: 5 bytes are not whole rows" in capsys.readouterr().err
     scan = read_scan(mine / "0.bin"), read_scan(mine / "1.bin")
     near = np.concatenate([each.range < 10 for each in scan])
     rain = np.concatenate([np.fromfile(out / f"{n}.label", "<u4") == 1 for n in range(2)])

@@ -62,6 +62,15 @@ def test_a_student_sees_what_its_start_sees(tmp_path: Path) -> None:
     assert str(student) == f"outdet, blind to intensity, started from {start}"
 
 
+def test_cues_weigh_intensity_where_there_is_any_and_are_never_blind_to_it(tmp_path: Path) -> None:
+    scans, dark = write_scans(tmp_path / "scans"), write_scans(tmp_path / "dark", columns=3)
+    for source in (scans, dark):
+        student = student_of(config(tmp_path / "scans", model="cues"), source)
+        assert (student.config, student.settings) == ("cues_taught.yaml", {})
+    with pytest.raises(InputError, match="--blind: cues weighs intensity"):
+        student_of(config(tmp_path / "scans", model="cues", blind=True), scans)
+
+
 def test_a_network_without_a_configuration_has_that_of_a_network_of_the_same_view(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

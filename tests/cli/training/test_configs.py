@@ -36,7 +36,7 @@ ONE_STEP = [
 TRAINED = {
     *("lisnownet_rehearse3d.yaml", "outdet_wads36.yaml", "outdet_wads.yaml"),
     *("salsanext_simulated.yaml", "salsanext_lite_taught.yaml", "outdet_mixture.yaml"),
-    *("cued_outdet_worlds.yaml", "relative_outdet_worlds.yaml"),
+    "cues_worlds.yaml",
 }
 
 NARROW = ["--model.width", "4"]

@@ -4,12 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
 from derain.scan import Scan
 from derain.system.open3d_import import import_open3d
+from derain.workflows.configurations import packaged_configs
 
 WORLD = """
 places: {street: 1}
@@ -27,17 +29,18 @@ def test_worlds_are_made_trained_on_and_exported(succeed, monkeypatch: pytest.Mo
     except InputError as error:
         pytest.skip(str(error))
     Path("small.yaml").write_text(WORLD, "utf-8")
+    config = yaml.safe_load(packaged_configs()["cues_worlds.yaml"].read_text("utf-8"))
+    for part in config["data"]["init_args"]["parts"].values():
+        part["init_args"]["campaign"] |= {"world": "small.yaml", "train": 2, "validation": 1}
+        part["init_args"]["workers"] = 1
+    Path("worlds.yaml").write_text(yaml.safe_dump(config), "utf-8")
     options = [
-        *("--data.root", "worlds", "--data.workers", 1, "--data.loading.workers", 0),
-        *("--data.campaign.train", 2, "--data.campaign.validation", 1),
-        *("--data.campaign.world", "small.yaml", "--trainer.enable_progress_bar", "false"),
+        *("--data.scans_per_epoch", 8, "--data.loading.workers", 0),
         *("--trainer.max_epochs", 1, "--trainer.check_val_every_n_epoch", 1),
-        *("--panels.scans", 0, "--errors.pictures", 0),
+        *("--trainer.enable_progress_bar", "false", "--panels.scans", 0, "--errors.pictures", 0),
     ]
-    succeed("fit", "--config", "relative_outdet_worlds.yaml", *options)
-    (geometry,) = Path("runs").rglob("last.ckpt")
-    succeed("fit", "--config", "cued_outdet_worlds.yaml", "--start", geometry, *options)
-    (checkpoint,) = Path("runs/cued_outdet_worlds").rglob("last.ckpt")
+    succeed("fit", "--config", "worlds.yaml", *options)
+    (checkpoint,) = Path("runs/cues_worlds").rglob("last.ckpt")
     scene(500).tofile("scan.bin")
     # The whole proof has tests of its own.
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])

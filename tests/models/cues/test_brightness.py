@@ -4,47 +4,49 @@ import numpy as np
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
+from torch import Tensor
 
-from derain.models.cues.brightness import FARTHEST, LARGEST, NEAREST, SHELLS, Histograms
-from derain.views.channels import INTENSITY_RANKS
+from derain.models.cues.brightness import LARGEST, calibrated
+from derain.views.intensity_rank import INTENSITY_RANKS
+from derain.views.isolated_points import SHELLS
 
 
-def drawn(seed: int, points: int = 500) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-    """Logarithms of range, ranks and probabilities."""
+def drawn(seed: int, points: int = 500) -> tuple[Tensor, Tensor, Tensor]:
+    """Points by shell and rank, the cell of each of them, and how probably it is rain."""
     generator = np.random.default_rng(seed)
-    log_range = np.log(generator.uniform(0.5, 90, points))
-    rank = generator.integers(0, INTENSITY_RANKS, points) / (INTENSITY_RANKS - 1)
-    probability = generator.uniform(0, 1, points)
-    return torch.tensor(log_range), torch.tensor(rank), torch.tensor(probability)
+    cell = torch.tensor(generator.integers(0, SHELLS * INTENSITY_RANKS, points))
+    return counted(cell), cell, torch.tensor(generator.uniform(0, 1, points))
+
+
+def counted(cell: Tensor) -> Tensor:
+    counts = torch.bincount(cell, minlength=SHELLS * INTENSITY_RANKS)
+    return counts.reshape(SHELLS, INTENSITY_RANKS).float()
+
+
+def smoothed(counts: np.ndarray) -> np.ndarray:
+    for axis in (0, 1):
+        padding = [(1, 1) if axis == number else (0, 0) for number in (0, 1)]
+        wide = np.pad(counts, padding, mode="edge")
+        take = [wide.take(range(n, n + counts.shape[axis]), axis) for n in range(3)]
+        counts = 0.25 * take[0] + 0.5 * take[1] + 0.25 * take[2]
+    return counts
 
 
 @given(st.integers(0, 2**32 - 1))
 def test_log_odds_are_those_of_smoothed_counts(seed: int) -> None:
-    log_range, rank, probability = drawn(seed)
+    counts, cell, probability = drawn(seed)
     rain, rest = np.zeros((2, SHELLS, INTENSITY_RANKS))
-    edges = np.geomspace(NEAREST, FARTHEST, SHELLS + 1)[1:-1]
-    for distance, level, p in zip(
-        *(of.tolist() for of in (log_range.exp(), rank, probability)), strict=True
-    ):
-        cell = np.searchsorted(edges, distance), round(level * (INTENSITY_RANKS - 1))
-        rain[cell] += p
-        rest[cell] += 1 - p
-
-    def smoothed(counts: np.ndarray) -> np.ndarray:
-        for axis in (0, 1):
-            padding = [(1, 1) if axis == number else (0, 0) for number in (0, 1)]
-            wide = np.pad(counts, padding, mode="edge")
-            take = [wide.take(range(n, n + counts.shape[axis]), axis) for n in range(3)]
-            counts = 0.25 * take[0] + 0.5 * take[1] + 0.25 * take[2]
-        return counts
-
+    for number, p in zip(cell.tolist(), probability.tolist(), strict=True):
+        place = divmod(number, INTENSITY_RANKS)
+        rain[place] += p
+        rest[place] += 1 - p
     rain, rest = smoothed(rain), smoothed(rest)
     both = rain + rest + 1e-12
     usual = 100 * both / both.sum(1, keepdims=True)
     in_rain = (rain + usual) / (rain.sum(1, keepdims=True) + 100)
     in_rest = (rest + usual) / (rest.sum(1, keepdims=True) + 100)
     expected = np.log(in_rain / in_rest).clip(-LARGEST, LARGEST)
-    found = Histograms(log_range, rank).brightness(torch.arange(len(rank)), probability)
+    found = calibrated(counts, cell, probability)
     log_odds = found.log_odds.reshape(SHELLS, INTENSITY_RANKS).numpy()
     occurring = both > 0.1
     np.testing.assert_allclose(log_odds[occurring], expected[occurring], atol=1e-4)
@@ -52,22 +54,17 @@ def test_log_odds_are_those_of_smoothed_counts(seed: int) -> None:
 
 
 def test_where_all_are_alike_or_none_is_rain_brightness_means_nothing() -> None:
-    log_range, rank, probability = drawn(0)
-    rows = torch.arange(len(rank))
-    of_alike = Histograms(log_range, torch.zeros_like(rank))
-    of_all = Histograms(log_range, rank)
-    alike = of_alike.brightness(rows, probability)
-    dry = of_all.brightness(rows, torch.zeros_like(probability))
-    assert alike.log_odds[of_alike.cell].abs().max() < 1e-6
-    assert dry.log_odds[of_all.cell].abs().max() < 1e-6
+    counts, cell, probability = drawn(0)
+    darkest = cell - cell % INTENSITY_RANKS
+    alike = calibrated(counted(darkest), darkest, probability)
+    dry = calibrated(counts, cell, torch.zeros_like(probability))
+    assert alike.log_odds[darkest].abs().max() < 1e-6
+    assert dry.log_odds[cell].abs().max() < 1e-6
 
 
 def test_points_that_are_not_asked_about_count_as_no_rain() -> None:
-    log_range, rank, probability = drawn(1)
-    rows = torch.arange(0, len(rank), 3)
-    some = Histograms(log_range, rank).brightness(rows, probability[rows])
-    others = torch.ones(len(rank), dtype=torch.bool).index_fill(0, rows, False)
-    every = Histograms(log_range, rank).brightness(
-        torch.arange(len(rank)), probability.masked_fill(others, 0)
-    )
+    counts, cell, probability = drawn(1)
+    asked = torch.arange(len(cell)) % 3 == 0
+    some = calibrated(counts, cell[asked], probability[asked])
+    every = calibrated(counts, cell, probability * asked)
     torch.testing.assert_close(some.log_odds, every.log_odds)

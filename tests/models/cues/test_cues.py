@@ -7,6 +7,7 @@ import lightning
 import numpy as np
 import pytest
 import torch
+from torch.nn import functional
 
 from derain.datamodules.in_memory import InMemory
 from derain.datamodules.scan_data import Loading
@@ -16,10 +17,9 @@ from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.learning.batch import Batch, Sample
 from derain.models.checkpoint import load_model, save_model
-from derain.models.cues import CuedOutDet
+from derain.models.cues import CueFusion
+from derain.models.cues.beams import in_steps
 from derain.models.outdet import OutDet
-from derain.models.relative_outdet import RelativeOutDet
-from derain.models.start import started
 from derain.scan import Scan
 
 
@@ -34,10 +34,10 @@ def labelled(seed: int, drops: int = 300, gain: float = 1.0) -> Scan:
 
 
 @pytest.fixture(scope="module")
-def trained() -> CuedOutDet:
-    """Trained on a few scenes, geometry and fusion together."""
+def trained() -> CueFusion:
+    """Trained on a few scenes."""
     lightning.seed_everything(0)
-    model = CuedOutDet(learning_rate=1e-2)
+    model = CueFusion(learning_rate=1e-2)
     data = InMemory(
         train=[labelled(seed) for seed in range(4)],
         validation=[labelled(9)],
@@ -52,7 +52,7 @@ def trained() -> CuedOutDet:
 
 
 @pytest.fixture(scope="module")
-def exported(trained: CuedOutDet, tmp_path_factory: pytest.TempPathFactory) -> Derainer:
+def exported(trained: CueFusion, tmp_path_factory: pytest.TempPathFactory) -> Derainer:
     path = tmp_path_factory.mktemp("cues") / "model.onnx"
     assert export(trained, path).holds
     return Derainer(path, threads=1)
@@ -66,7 +66,7 @@ def test_brightness_helps_whatever_its_unit(exported: Derainer) -> None:
     def iou(answer: np.ndarray) -> float:
         return float((answer & rain).sum() / (answer | rain).sum())
 
-    assert iou(called) > 0.9
+    assert iou(called) > 0.8
     np.testing.assert_array_equal(exported(labelled(20, gain=1 / 255)), called)
     alike = exported(replace(scan, intensity=np.full(len(scan), 7, np.float32)))
     assert iou(alike) < iou(called) - 0.05
@@ -79,7 +79,7 @@ def test_rows_in_another_order_are_judged_alike(exported: Derainer) -> None:
     np.testing.assert_allclose(shuffled, exported.probability(scan)[order], atol=1e-4)
 
 
-def test_scans_of_a_batch_say_nothing_to_each_other(trained: CuedOutDet) -> None:
+def test_scans_of_a_batch_say_nothing_to_each_other(trained: CueFusion) -> None:
     view = trained.spec.make_view()
     scans = [labelled(30), labelled(31, drops=30)]
     samples = [
@@ -90,45 +90,53 @@ def test_scans_of_a_batch_say_nothing_to_each_other(trained: CuedOutDet) -> None
     torch.testing.assert_close(together, apart)
 
 
-def test_a_checkpoint_gives_the_same(trained: CuedOutDet, tmp_path: Path) -> None:
+def test_a_checkpoint_gives_the_same(trained: CueFusion, tmp_path: Path) -> None:
     save_model(trained, tmp_path / "model.ckpt")
     again = load_model(tmp_path / "model.ckpt")
     assert again.spec == trained.spec
-    assert isinstance(again, CuedOutDet)
+    assert isinstance(again, CueFusion)
     for own, other in zip(trained.state_dict().values(), again.state_dict().values(), strict=True):
         torch.testing.assert_close(own, other, rtol=0, atol=0)
 
 
-def test_it_starts_from_a_trained_geometry_and_may_leave_that_as_it_is(
-    trained: CuedOutDet, tmp_path: Path
-) -> None:
-    geometry = RelativeOutDet(width=16)
-    geometry.adopt(replace(_of_geometry(trained), network="relative_outdet"))
-    save_model(geometry, tmp_path / "geometry.ckpt")
-    model = started(CuedOutDet(geometry_share=0.0), tmp_path / "geometry.ckpt", "geometry")
-    assert model.hparams["width"] == 16
-    weights = model.network.geometry.state_dict()
-    for name, weight in geometry.network.state_dict().items():
-        torch.testing.assert_close(weights[name], weight)
-    learning = {id(weight) for group in model.parameter_groups() for weight in group["params"]}
-    assert not learning & {id(weight) for weight in model.network.geometry.parameters()}
-
-
-def _of_geometry(model: CuedOutDet) -> object:
-    """The Spec of a model that sees geometry alone."""
-    spec = model.spec
-    return replace(
-        spec,
-        view={"kind": "neighbours", "neighbours": 9},
-        channels=spec.channels[:3],
-        units=spec.units[:3],
-        mean=spec.mean[:3],
-        std=spec.std[:3],
-    )
-
-
 def test_it_needs_its_neighbours_and_a_start_of_its_kind() -> None:
     with pytest.raises(InputError, match="neighbours: 8 are too few"):
-        CuedOutDet(neighbours=8)
-    with pytest.raises(InputError, match="from which cued_outdet cannot start"):
-        CuedOutDet().begin_from(OutDet())
+        CueFusion(neighbours=8)
+    with pytest.raises(InputError, match="from which cues cannot start"):
+        CueFusion().begin_from(OutDet())
+
+
+@pytest.mark.parametrize("turn", [0.3, 2.0, np.pi])
+def test_neighbours_in_steps_are_the_same_in_every_direction_and_at_every_range(
+    turn: float,
+) -> None:
+    generator = np.random.default_rng(0)
+    points = generator.normal((10, 0, 0), 1, (40, 3))
+    neighbours = torch.tensor(np.stack([generator.permutation(40)[:5] for _ in range(12)], 1))
+
+    def seen(xyz: np.ndarray, step: float) -> torch.Tensor:
+        places = torch.tensor(xyz)
+        near = functional.embedding(neighbours, places)
+        distances = (near - near[0]).norm(dim=2)
+        return in_steps(places, distances, neighbours, torch.tensor(step))[0]
+
+    turned = points @ [[np.cos(turn), np.sin(turn), 0], [-np.sin(turn), np.cos(turn), 0], [0, 0, 1]]
+    torch.testing.assert_close(seen(turned, 0.01), seen(points, 0.01), rtol=1e-6, atol=1e-6)
+    torch.testing.assert_close(seen(7 * points, 0.01), seen(points, 0.01), rtol=1e-6, atol=1e-6)
+    mirrored = points * [1, -1, 1]
+    torch.testing.assert_close(seen(mirrored, 0.01), seen(points, 0.01), rtol=1e-6, atol=1e-6)
+
+
+def test_farther_aside_and_up_are_measured_along_the_beam_and_across_it() -> None:
+    places = torch.tensor([[10.0, 0, 0], [10.5, 0, 0], [10, 0.2, 0], [10, 0, -0.3]]).double()
+    neighbours = torch.arange(4)[:, None]
+    distances = (places - places[0]).norm(dim=1)[:, None]
+    seen, far = in_steps(places, distances, neighbours, torch.tensor(0.01).double())
+    length = 0.1  # a step at 10 m
+    apart, farther, aside, risen = seen[:, :, 0]
+    torch.testing.assert_close(apart, torch.log(distances[1:, 0] / length + 0.01))
+    ends = places.norm(dim=1)
+    torch.testing.assert_close(farther.sinh() * length, (ends[1:] - ends[0]))
+    torch.testing.assert_close(aside.sinh() * length, places[1:, 1])
+    torch.testing.assert_close(risen.sinh() * length, places[1:, 2])
+    assert far[0] == 0

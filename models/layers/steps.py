@@ -1,0 +1,45 @@
+"""Places of neighbours in steps of the sensor's beams: what nothing of differs between sensors."""
+
+import torch
+from torch import Tensor
+
+# Nothing is measured nearer than this, metres, nor right above the sensor; both keep every
+# division finite.
+NEAREST_POINT = 0.05
+NEAREST_TO_AXIS = 0.01
+
+# Added to what logarithms are taken of, which may be 0.
+STEP_EPSILON = 1e-2
+
+# Ranges are logarithms over this one, metres.
+USUAL_RANGE = 10.0
+
+# However far a neighbour is, no number that describes it is greater.
+FARTHEST_IN_STEPS = 10.0
+
+# How many numbers describe where a neighbour is.
+NEIGHBOUR_NUMBERS = 4
+
+
+def asinh(steps: Tensor) -> Tensor:
+    """The inverse hyperbolic sine, by a logarithm: onnxruntime's own is many times slower."""
+    size = steps.abs()
+    return torch.sign(steps) * torch.log(size + (size * size + 1).sqrt())
+
+
+def farther_by(distance: Tensor, dot: Tensor, apart: Tensor) -> Tensor:
+    """How much farther neighbours are from the sensor: a difference of squares by the sum.
+
+    The difference of two ranges would leave the rounding of both, which where beams lie close is no
+    small part of a step.
+
+    Args:
+        distance: Ranges of the points, metres, float; of a shape that goes with the others'.
+        dot: Products of the points with the offsets of their neighbours, float.
+        apart: How far those are from the points, metres, float.
+
+    Returns:
+        Metres, float, in the shape of ``dot``.
+    """
+    squares = 2 * dot + apart * apart
+    return squares / ((distance * distance + squares).clamp_min(0).sqrt() + distance)
