@@ -21,16 +21,14 @@ from derain.datamodules.base import Loading
 from derain.datamodules.labelled import named_scans
 from derain.evaluation.counts import Counts
 from derain.recordings.evidence import (
-    RayEvidence,
     combined_log_odds,
-    mean_evidence,
-    ray_evidence,
     ray_log_odds,
     surroundings_log_odds,
     vote,
 )
 from derain.recordings.known_points import ScanPoints
 from derain.recordings.posed import with_poses
+from derain.recordings.rays import RayEvidence, mean_evidence
 from derain.sources.frame import Frame
 from derain.sources.recordings import recordings_of
 from derain.system.cores import usable_cores
@@ -74,8 +72,7 @@ def _seen(
     most = 2 if len(recording) > 6 else 1
     for place in range(most, len(recording) - most):
         told = {
-            step: ray_evidence(
-                points[place],
+            step: points[place].evidence_of(
                 points[place + step],
                 np.linalg.inv(_pose(recording[place + step])) @ _pose(recording[place]),
             )

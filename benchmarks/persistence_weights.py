@@ -1,4 +1,4 @@
-"""Fits the weights of persistence to simulated drives, whose truth is known.
+"""Fits the weights of rays and surroundings to simulated drives, whose truth is known.
 
     for sensor in spinning_64_far spinning_64 mems_64; do
       derain simulate --layout street --speed 13 --traffic 10 --sensor $sensor \
@@ -10,29 +10,48 @@
 
 Prints what stands in derain/recordings/evidence.py: logistic regressions on what other scans'
 rays say, and on how points lie in their own scan, each alone. Every scan counts as much as the
-others, whatever its number of points.
+others, whatever its number of points. And what stands in export/recorded.py: what rays add to the
+log-odds of the model that comes with derain, at the points of which it is in doubt.
 """
 
 import argparse
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize
 from sklearn.linear_model import LogisticRegression
 
 from derain.cards.card import load_card
 from derain.datamodules.base import Loading
 from derain.datamodules.labelled import named_scans
-from derain.recordings.evidence import mean_evidence, ray_evidence, surroundings_features
+from derain.export.recorded import DOUBTFUL
+from derain.export.runtime import Derainer
+from derain.recordings.evidence import surroundings_features
 from derain.recordings.known_points import ScanPoints
+from derain.recordings.rays import RayEvidence, mean_evidence
 from derain.sources.frame import Frame
 from derain.sources.recordings import recordings_of
 from derain.system.cores import usable_cores
 
-# What is known of the points of one scan: by rays, (M, 3), and of themselves, (M, 10), and the
-# truth, bool (M,).
-Described = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]
+
+@dataclass(frozen=True)
+class Described:
+    """What is known of the M points of one scan.
+
+    Attributes:
+        rays: Where rays of other scans end, and where they went through.
+        surroundings: How the points lie, float64 (M, 10).
+        alone: Probability of rain by the model that comes with derain, float32 (M,).
+        rain: The truth, bool (M,).
+    """
+
+    rays: RayEvidence
+    surroundings: NDArray[np.float64]
+    alone: NDArray[np.float32]
+    rain: NDArray[np.bool_]
 
 
 def main() -> None:
@@ -40,45 +59,67 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("roots", nargs="+", type=Path, help="simulated data sets")
     roots = parser.parse_args().roots
-    rays, surroundings, truth = zip(*_described(roots), strict=True)
-    rain = np.concatenate(truth)
-    weight = np.concatenate([np.full(len(each), 1 / len(each)) for each in truth])
-    weight *= len(rain) / len(truth)
-    share = float(np.mean([each.mean() for each in truth]))
-    print(f"{len(truth)} scans, {share:.2%} rain")
-    print("RAY_WEIGHTS =", _fitted(np.concatenate(rays), rain, weight))
-    print("SURROUNDINGS_WEIGHTS =", _fitted(np.concatenate(surroundings), rain, weight))
+    scans = list(_described(roots))
+    rain = np.concatenate([scan.rain for scan in scans])
+    weight = np.concatenate([np.full(len(scan.rain), 1 / len(scan.rain)) for scan in scans])
+    weight *= len(rain) / len(scans)
+    share = float(np.mean([scan.rain.mean() for scan in scans]))
+    rays = np.concatenate([_columns(scan.rays) for scan in scans])
+    surroundings = np.concatenate([scan.surroundings for scan in scans])
+    print(f"{len(scans)} scans, {share:.2%} rain")
+    print("RAY_WEIGHTS =", _fitted(rays, rain, weight))
+    print("SURROUNDINGS_WEIGHTS =", _fitted(surroundings, rain, weight))
     print(f"PRIOR = {np.log(share / (1 - share)):.2f}")
+    print("OF_ENDING, OF_THROUGH =", _added(scans))
 
 
 def _described(roots: list[Path]) -> Iterator[Described]:
     """What is known of each scan that has others before and after it."""
-    card = load_card("simulated")
+    card, model = load_card("simulated"), Derainer()
     data = named_scans(roots, card, Loading())
     for recording in recordings_of(data.source("test")):
         scans = [data.read(frame) for frame in recording]
         points = [ScanPoints.of(scan, usable_cores()) for scan in scans]
         for place in range(1, len(recording) - 1):
             first = _first_rows(points[place])
+            alone = model.probability(scans[place])[first]
             rain = card.rain_of(scans[place])[first]
-            yield (*_told(recording, points, place), rain)
+            surroundings = surroundings_features(points[place])
+            yield Described(_evidence(recording, points, place), surroundings, alone, rain)
 
 
-def _told(
-    recording: list[Frame], points: list[ScanPoints], place: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """What rays say of the points of a scan, and how they lie."""
-    own = points[place]
-    evidence = mean_evidence(
-        [
-            ray_evidence(
-                own, points[other], np.linalg.inv(_pose(recording[other])) @ _pose(recording[place])
-            )
-            for other in (place - 1, place + 1)
-        ]
-    )
-    rays = np.stack([np.ones(len(own)), evidence.ending, evidence.through], axis=1)
-    return rays, surroundings_features(own)
+def _evidence(recording: list[Frame], points: list[ScanPoints], place: int) -> RayEvidence:
+    """What the rays of the scans before and after show at the points of a scan."""
+    own, found = points[place], []
+    for other in (place - 1, place + 1):
+        to_other = np.linalg.inv(_pose(recording[other])) @ _pose(recording[place])
+        found.append(own.evidence_of(points[other], to_other))
+    return mean_evidence(found)
+
+
+def _columns(evidence: RayEvidence) -> NDArray[np.float64]:
+    """One, what ends, and what goes through, float64 (M, 3)."""
+    return np.stack([np.ones_like(evidence.ending), evidence.ending, evidence.through], axis=1)
+
+
+def _added(scans: list[Described]) -> tuple[float, ...]:
+    """Weights of what rays add to the model's log-odds where it is in doubt."""
+    doubted = [scan.alone > DOUBTFUL for scan in scans]
+    of_scans = list(zip(scans, doubted, strict=True))
+    columns = np.concatenate([_columns(scan.rays)[rows, 1:] for scan, rows in of_scans])
+    alone = np.concatenate([scan.alone[rows] for scan, rows in of_scans]).astype(np.float64)
+    rain = np.concatenate([scan.rain[rows] for scan, rows in of_scans])
+    weight = np.concatenate([np.full(rows.sum(), 1 / max(rows.sum(), 1)) for rows in doubted])
+    alone = alone.clip(1e-9, 1 - 1e-9)
+    before = np.log(alone / (1 - alone))
+
+    def loss(weights: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+        log_odds = before + columns @ weights
+        error = weight * (1 / (1 + np.exp(-log_odds)) - rain)
+        of_points = np.logaddexp(0, log_odds) - rain * log_odds
+        return float(weight @ of_points), error @ columns
+
+    return tuple(float(round(each, 2)) for each in minimize(loss, np.zeros(2), jac=True).x)
 
 
 def _pose(frame: Frame) -> NDArray[np.float64]:

@@ -134,6 +134,12 @@ class Derainer(Method):
         Raises:
             InputError: A network that fails, or whose scores are not finite.
         """
+        return self.with_warnings(self.judge_silently(points, stopwatch))
+
+    def judge_silently(
+        self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None
+    ) -> Judgement:
+        """As :meth:`judge`, without warnings."""
         scan = Scan.of(points)
         return self._judged(scan, lambda: self.view(scan), stopwatch or Stopwatch())
 
@@ -260,7 +266,7 @@ class Derainer(Method):
     def _judged_in_window(self, ready: FrameInWindow, stopwatch: Stopwatch) -> Judgement:
         scans = ready.scans
         judgement = self._judged(scans.scan, lambda: self.view.of_window(scans), stopwatch)
-        return replace(judgement, frame=ready.frame)
+        return self.with_warnings(replace(judgement, frame=ready.frame))
 
     def _judged(self, scan: Scan, see: Callable[[], ViewedScan], stopwatch: Stopwatch) -> Judgement:
         """Judges a scan by what ``see`` gives."""
@@ -272,8 +278,7 @@ class Derainer(Method):
         with stopwatch.stage("back"):
             probability = view.back(probability_of_rain(logits))
             rain = probability > self.spec.threshold
-            judgement = Judgement(probability, rain, view.judged, scan)
-        return self.with_warnings(judgement)
+        return Judgement(probability, rain, view.judged, scan)
 
     def _check_scores(self, logits: NDArray[np.float32], view: ViewedScan, scan: Scan) -> None:
         """Refuses scores that would count as "not rain" because nothing compares with them."""

@@ -7,34 +7,12 @@ independent witnesses, with weights fitted to simulated drives, whose truth is k
 point and its neighbours vote, because drops fly among drops and surfaces hang together.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.recordings.known_points import ScanPoints, range_of
+from derain.recordings.known_points import ScanPoints
+from derain.recordings.rays import RayEvidence
 from derain.views.scatter import scatter_through_space
-
-# Rays of the other scan that are looked up for each place. They lie on two or three of its beams:
-# one more drop does not decide.
-RAYS = 8
-
-# Rays count that pass a place by no more than this angle, degrees, or by so many steps of a coarser
-# sensor. The wider the bound, the more places have rays, and the more rays pass edges.
-WITHIN, WITHIN_STEPS = 0.6, 1.8
-
-# A ray that ends at the place: metres, and metres more for each metre of range, by which steps and
-# registration make ends differ. One that ends farther behind it than the other bound went through.
-ENDS_AT = (0.1, 0.01)
-WENT_THROUGH = (0.5, 0.01)
-
-# A ray that passes the place by this angle, degrees, has half the weight of one that meets it. From
-# a sensor that stands the same ray comes back, and shows more than all those around it; from one
-# that moves no ray passes nearer, because its poses are true to a tenth of a degree.
-HALF_WEIGHT_AT = 0.1
-
-# The least sum of weights: where no ray passes near, all of them together count less.
-LEAST_WEIGHT = 0.2
 
 # What is added before a logarithm is taken, and what then takes the usual value to 0.
 STEP_EPSILON, USUAL_STEPS = 1e-3, 1.0
@@ -61,60 +39,6 @@ HALF_AT = (0.1, 0.01)
 LARGEST_LOG_ODDS = 4.0
 
 
-@dataclass(frozen=True, eq=False)
-class RayEvidence:
-    """What the rays of another scan, or of several, show at the places of M points.
-
-    Attributes:
-        ending: Share of the rays near a place that end at it, float64 (M,), weighted by how near
-            they pass.
-        through: Share of them that went through it to something behind, float64 (M,).
-    """
-
-    ending: NDArray[np.float64]
-    through: NDArray[np.float64]
-
-
-def ray_evidence(
-    points: ScanPoints, other: ScanPoints, to_other: NDArray[np.float64]
-) -> RayEvidence:
-    """Finds how the rays of another scan pass the places of a scan's points.
-
-    It does not matter how the sensor scans: its rays are where its returns are. Each of two returns
-    of a ray is the end of a ray of its own: that of a solid thing went through the drop before it.
-
-    Args:
-        points: The points, M of them.
-        other: The other scan.
-        to_other: Takes the frame of the points to that of the other scan, float64 (4, 4), metres.
-
-    Returns:
-        The evidence; zeros where no ray is near.
-    """
-    if not len(other):
-        return RayEvidence(np.zeros(len(points)), np.zeros(len(points)))
-    places = points.xyz @ to_other[:3, :3].T + to_other[:3, 3]
-    reach = range_of(places)
-    rays, angles = other.rays_near(places / reach[:, None], RAYS)
-    near = angles <= max(np.radians(WITHIN), WITHIN_STEPS * points.step)
-    behind = other.range.take(rays) - reach[:, None]
-    at, through = (offset + slope * reach[:, None] for offset, slope in (ENDS_AT, WENT_THROUGH))
-    weight = near / (1 + np.square(angles / np.radians(HALF_WEIGHT_AT)))
-    total_weight = np.maximum(weight.sum(axis=1), LEAST_WEIGHT)
-    return RayEvidence(
-        (weight * (np.abs(behind) <= at)).sum(axis=1) / total_weight,
-        (weight * (behind > through)).sum(axis=1) / total_weight,
-    )
-
-
-def mean_evidence(evidence: list[RayEvidence]) -> RayEvidence:
-    """The mean of the evidence of several scans, at least one."""
-    return RayEvidence(
-        np.mean([one.ending for one in evidence], axis=0),
-        np.mean([one.through for one in evidence], axis=0),
-    )
-
-
 def surroundings_features(points: ScanPoints) -> NDArray[np.float64]:
     """Describes the surroundings of each point by three numbers, their squares and products.
 
@@ -128,7 +52,7 @@ def surroundings_features(points: ScanPoints) -> NDArray[np.float64]:
     Returns:
         One, the numbers, and their six squares and products, float64 (M, 10), finite.
     """
-    step = max(points.step, LEAST_STEP)
+    step = max(points.rays.step, LEAST_STEP)
     steps_apart = points.distances[:, 1:].mean(axis=1) / (points.range * step)
     scatter = scatter_through_space(points.xyz, points.neighbours)
     apart = np.log(steps_apart + STEP_EPSILON) - USUAL_STEPS

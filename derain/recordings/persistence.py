@@ -11,27 +11,22 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.documents import shown
-from derain.recordings.evidence import (
-    RayEvidence,
-    combined_log_odds,
-    mean_evidence,
-    ray_evidence,
-    vote,
-)
+from derain.recordings.evidence import combined_log_odds, vote
 from derain.recordings.known_points import ScanPoints
-from derain.recordings.odometry import FrameOdometry
+from derain.recordings.placing import PlacedFrames
+from derain.recordings.rays import RayEvidence, mean_evidence
 from derain.recordings.recording_method import RecordingMethod
 from derain.recordings.registry import METHODS
 from derain.scan import Scan
-from derain.sources.frame import Frame, MemoryFrame
+from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
-from derain.sources.recent_frames import FrameInWindow, RecentFrames
+from derain.sources.recent_frames import FrameInWindow
 from derain.system.cores import threads_of
 from derain.system.registry import from_parameters
 from derain.system.stopwatch import Stopwatch
 from derain.views.one_viewpoint import viewpoint_issues
 from derain.views.scan_issues import ScanIssue
-from derain.views.window import PlacedScan, Window, WindowOfScans
+from derain.views.window import Window, WindowOfScans
 
 # Scans kept at a time are bounded: each takes some 30 MB with its neighbours and rays.
 MOST_SCANS = 50
@@ -68,21 +63,6 @@ class Persistence:
         sure: Any = self.sure
         if not (isinstance(sure, int | float) and 1 <= sure < math.inf):
             raise InputError("persistence", f"sure is {shown(sure)}", "Give odds of 1 or more.")
-
-
-@dataclass(frozen=True, eq=False)
-class _Placed:
-    """A scan of the window as the evidence needs it.
-
-    Attributes:
-        points: Its points.
-        pose: Sensor to world, float64 (4, 4), metres.
-        stretch: Scans of one number have poses in one world, with none in doubt between them.
-    """
-
-    points: ScanPoints
-    pose: NDArray[np.float64]
-    stretch: int
 
 
 @METHODS.add("persistence")
@@ -152,16 +132,7 @@ class PersistenceDerainer(RecordingMethod):
         The stages are read, odometry where no pose is given, view, network (the evidence) and back.
         """
         stopwatch = stopwatch or Stopwatch()
-        if not isinstance(frame, Frame):
-            number = self._recent.next_number
-            frame = MemoryFrame(key=f"{number:06d}", number=number, scan=Scan.of(frame))
-        with stopwatch.stage("read"):
-            scan = frame.read()  # an object of its own, even of a scan that is pushed again
-        with stopwatch.stage("odometry"):
-            pose, stretch = self._place(frame, scan)
-        with stopwatch.stage("view"):
-            self._placed[scan] = _Placed(ScanPoints.of(scan, self.threads), pose, stretch)
-        ready = self._recent.push(frame, PlacedScan(scan))
+        ready = self._recent.place(frame, stopwatch)
         return None if ready is None else self._judged(ready, stopwatch)
 
     def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
@@ -177,7 +148,7 @@ class PersistenceDerainer(RecordingMethod):
     def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
         """What is odd about a scan: its places, nothing known of it, or no pose to be trusted."""
         yield from viewpoint_issues(judgement.scan)
-        yield from self._doubts.get(judgement.scan, ())
+        yield from self._recent.doubts(judgement.scan)
         if judgement.known is not None and not judgement.known.any() and judgement.judged.any():
             yield ScanIssue(
                 "nothing is known for sure",
@@ -193,42 +164,18 @@ class PersistenceDerainer(RecordingMethod):
         return type(self), (self.persistence, self.threads), {"warns": self.warns}
 
     def _end_recording(self) -> None:
-        self._recent = RecentFrames(self.window)
-        self._odometry = FrameOdometry(self.threads)
-        self._placed: WeakKeyDictionary[Scan, _Placed] = WeakKeyDictionary()
-        self._doubts: WeakKeyDictionary[Scan, list[ScanIssue]] = WeakKeyDictionary()
-        self._stretch = 0
-        self._poses_are_given: bool | None = None  # not before the first frame
-
-    def _place(self, frame: Frame, scan: Scan) -> tuple[NDArray[np.float64], int]:
-        """Where a frame was taken, and in which stretch of its recording."""
-        pose = self._given_pose(frame, scan)
-        given = pose is not None
-        if self._poses_are_given not in (None, given) or self._recent.starts_new_recording(frame):
-            self._stretch += 1  # another world
-        self._poses_are_given = given
-        if pose is not None:
-            return pose, self._stretch
-        registration = self._odometry.register(frame, scan)
-        self._doubts.setdefault(scan, []).extend(registration.issues())
-        if not registration.trusted:
-            self._stretch += 1
-        return registration.pose, self._stretch
-
-    def _given_pose(self, frame: Frame, scan: Scan) -> NDArray[np.float64] | None:
-        """The pose that is given with a frame; None without one, and of a damaged record."""
-        try:
-            return frame.pose
-        except InputError as error:
-            detail = f"its pose is not known, and is sought from the scans: {error}"
-            self._doubts[scan] = [ScanIssue("its pose is sought from the scans", detail)]
-            return None
+        self._recent = PlacedFrames(self.window, self.threads)
+        self._points: WeakKeyDictionary[Scan, ScanPoints] = WeakKeyDictionary()
 
     def _judged(self, ready: FrameInWindow, stopwatch: Stopwatch) -> Judgement:
-        scan = ready.scans.scan
-        points = self._placed[scan].points
+        scan, scans = ready.scans.scan, ready.scans
+        with stopwatch.stage("view"):
+            for one in (scans.judged, *scans.before, *scans.after):
+                if one.scan not in self._points:
+                    self._points[one.scan] = ScanPoints.of(one.scan, self.threads)
+        points = self._points[scan]
         with stopwatch.stage("network"):
-            evidence = self._evidence(ready.scans)
+            evidence = self._evidence(scans)
             alone = combined_log_odds(points, evidence)
             agreed = vote(points, alone)
             sure = np.log(self.persistence.sure)
@@ -240,13 +187,11 @@ class PersistenceDerainer(RecordingMethod):
 
     def _evidence(self, scans: WindowOfScans) -> RayEvidence | None:
         """The evidence of the rays of the other scans; None without any."""
-        own = self._placed[scans.scan]
-        others = [self._placed[each.scan] for each in (*scans.before, *scans.after)]
-        found = [
-            ray_evidence(own.points, other.points, np.linalg.inv(other.pose) @ own.pose)
-            for other in others
-            if other.stretch == own.stretch and len(other.points)
-        ]
+        points, found = self._points[scans.scan], []
+        for other in (*scans.before, *scans.after):
+            transform = scans.judged.to(other)
+            if transform is not None and len(self._points[other.scan]):
+                found.append(points.evidence_of(self._points[other.scan], transform))
         return mean_evidence(found) if found else None
 
 

@@ -1,0 +1,89 @@
+"""The last frames of a recording, each where it was taken: by its pose, or else by odometry."""
+
+from collections.abc import Iterator
+from typing import Any
+from weakref import WeakKeyDictionary
+
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.recordings.odometry import FrameOdometry
+from derain.scan import Scan
+from derain.sources.frame import Frame, MemoryFrame
+from derain.sources.recent_frames import FrameInWindow, RecentFrames
+from derain.system.stopwatch import Stopwatch
+from derain.views.scan_issues import ScanIssue
+from derain.views.window import PlacedScan, Window
+
+# Kind of the issue of a frame whose record of its pose is damaged.
+SOUGHT = "its pose is sought from the scans"
+
+
+class PlacedFrames(RecentFrames):
+    """Takes frame after frame, places each, and returns it once those after it are there.
+
+    Poses are those of the frames. Where a frame has none, or the record of it is damaged, they are
+    found as it goes; where that fails, a new stretch begins, to which nothing before has a pose.
+
+    Args:
+        window: Frames before and after one that are to be seen with it.
+        threads: Threads that odometry may use; 0 takes every core this process may use.
+    """
+
+    def __init__(self, window: Window, threads: int = 0) -> None:
+        super().__init__(window)
+        self._odometry = FrameOdometry(threads)
+        self._doubts: WeakKeyDictionary[Scan, list[ScanIssue]] = WeakKeyDictionary()
+        self._stretch = 0
+        self._has_poses: bool | None = None  # whether the last frame had a pose; None before any
+
+    def place(
+        self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch
+    ) -> FrameInWindow | None:
+        """Reads and places the next frame; where it starts anew, those still waiting are dropped.
+
+        Args:
+            frame: A frame; or a scan, or its points, which is taken for the next of one sequence.
+            stopwatch: Takes the times of the stages read, and odometry where no pose is given.
+
+        Returns:
+            The frame that has all its window by now, if there is one.
+
+        Raises:
+            InputError: A frame that cannot be read.
+        """
+        if not isinstance(frame, Frame):
+            number = self.next_number
+            frame = MemoryFrame(key=f"{number:06d}", number=number, scan=Scan.of(frame))
+        with stopwatch.stage("read"):
+            scan = frame.read()  # an object of its own, even of a scan that is pushed again
+        with stopwatch.stage("odometry"):
+            placed = self._placed(frame, scan)
+        return self.push(frame, placed)
+
+    def doubts(self, scan: Scan) -> Iterator[ScanIssue]:
+        """What is in doubt about where a scan was taken."""
+        yield from self._doubts.get(scan, ())
+
+    def damage(self, scan: Scan) -> Iterator[ScanIssue]:
+        """What is damaged about the record of where a scan was taken."""
+        yield from (doubt for doubt in self.doubts(scan) if doubt.kind == SOUGHT)
+
+    def _placed(self, frame: Frame, scan: Scan) -> PlacedScan:
+        pose, doubts = None, []
+        try:
+            pose = frame.pose
+        except InputError as error:
+            detail = f"its pose is not known, and is sought from the scans: {error}"
+            doubts.append(ScanIssue(SOUGHT, detail))
+        given = pose is not None
+        if self.starts_new_recording(frame) or self._has_poses not in (None, given):
+            self._stretch += 1  # another world
+        self._has_poses = given
+        if pose is None:
+            registration = self._odometry.register(frame, scan)
+            doubts.extend(registration.issues())
+            self._stretch += not registration.trusted
+            pose = registration.pose
+        self._doubts[scan] = doubts
+        return PlacedScan(scan, None, pose, self._stretch)

@@ -1,0 +1,206 @@
+"""A model over a recording: what it makes of each scan, and the rays of the scans around it."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.export.runtime import Derainer
+from derain.recordings.placing import PlacedFrames
+from derain.recordings.rays import RayEvidence, Rays, mean_evidence, ray_evidence
+from derain.scan import Scan
+from derain.sources.frame import Frame
+from derain.sources.judgement import Judgement
+from derain.sources.method import Method
+from derain.sources.recent_frames import FrameInWindow
+from derain.system.stopwatch import Stopwatch
+from derain.views.morton import evenly
+from derain.views.scan_issues import ScanIssue
+from derain.views.window import Window, WindowOfScans
+
+# Points to which a model gives a lower probability keep it: hardly any of them is rain.
+DOUBTFUL = 0.01
+
+# Log-odds of rain that rays of other scans add to those of the model, fitted to simulated drives by
+# benchmarks/persistence_weights.py: for the share of them that ends at a place, and for the share
+# that went through it.
+OF_ENDING, OF_THROUGH = -4.87, 0.86
+
+# How much of them is added: the model has seen part of it, and drives differ from simulated ones.
+# Source: modelling choice.
+SHARE_ADDED = 0.5
+
+# Of at most so many points that the model takes for solid, more rays of another scan have to end at
+# them than go through them. Where they do not, a pose is wrong.
+CHECKED = 2000
+
+
+class RecordedDerainer(Method):
+    """Judges the scans of a recording by a model, and by the rays of the scans around each.
+
+    Rays of another scan that end where a point is show something solid there, and those that went
+    through the place show that nothing was. Where the sensor was comes from the poses of the
+    frames, or else from odometry. A scan of which that is not known, or whose pose does not match
+    what it shows, is judged alone.
+
+    Example:
+        >>> derainer = RecordedDerainer(Derainer("model.onnx"), past=1)
+        >>> [len(derainer.push(frame).rain) for frame in derain.named_frames("scan.bin")]
+        [820]
+
+    Args:
+        model: What judges a scan alone.
+        past: Scans before the one that is judged.
+        delay: Scans after it, which it has to wait for.
+
+    Raises:
+        InputError: Numbers of scans below 0, or a model that sees several scans itself.
+    """
+
+    def __init__(self, model: Derainer, past: int = 1, delay: int = 0) -> None:
+        if not model.window.is_one_scan:
+            reason = "its view already sees several scans"
+            raise InputError(model.name, reason, "Use the model itself.")
+        self.model = model
+        self.warns = model.warns
+        self._window = Window(past, delay)
+        self._end_recording()
+
+    @property
+    def window(self) -> Window:
+        """The scans before and after the one that it judges."""
+        return self._window
+
+    @property
+    def waiting(self) -> int:
+        """How many frames were pushed and are not answered for."""
+        return self._frames.waiting
+
+    def starts_new_recording(self, frame: Frame) -> bool:
+        """Whether a frame does not follow those that wait."""
+        return self.waiting > 0 and self._frames.starts_new_recording(frame)
+
+    def push(
+        self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch | None = None
+    ) -> Judgement | None:
+        """Takes the next frame of a recording; see :meth:`derain.sources.method.Method.push`.
+
+        The stages are those of the model, odometry, and rays.
+        """
+        stopwatch = stopwatch or Stopwatch()
+        ready = self._frames.place(frame, stopwatch)
+        return None if ready is None else self._judged(ready, stopwatch)
+
+    def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
+        """Ends a recording: answers for the frames that still wait, with the scans that there are.
+
+        Args:
+            stopwatch: Takes the times of the stages of the model, and rays.
+
+        Raises:
+            InputError: A network that fails.
+        """
+        while self.waiting:
+            yield self._judged(self._frames.pop(), stopwatch or Stopwatch())
+        self._end_recording()
+
+    def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
+        """What is odd about a scan for the model, and whether it does not match those around it."""
+        yield from self.model.issues(judgement)
+        yield from self._frames.damage(judgement.scan)
+        if judgement.scan in self._unlike:
+            yield ScanIssue(
+                "unlike the scans around it",
+                "the scans around it do not show the same from where it was taken: its pose is "
+                "wrong, or it is there twice; it is judged by itself",
+            )
+
+    def as_dict(self) -> dict[str, Any]:
+        """What commands call the model, its threshold, and how many scans around one it sees."""
+        return self.model.as_dict() | {"past": self.window.before, "delay": self.window.after}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # A copy, as in another process, begins a recording of its own.
+        return (
+            type(self),
+            (self.model, self.window.before, self.window.after),
+            {"warns": self.warns},
+        )
+
+    def _end_recording(self) -> None:
+        self._frames = PlacedFrames(self.window, self.model.threads)
+        self._rays: WeakKeyDictionary[Scan, Rays] = WeakKeyDictionary()
+        self._unlike: WeakKeyDictionary[Scan, bool] = WeakKeyDictionary()
+
+    def _judged(self, ready: FrameInWindow, stopwatch: Stopwatch) -> Judgement:
+        alone = self.model.judge_silently(ready.scans.scan, stopwatch)
+        with stopwatch.stage("rays"):
+            probability = self._with_rays(alone, ready.scans)
+        rain = probability > self.model.spec.threshold
+        judgement = replace(alone, probability=probability, rain=rain, frame=ready.frame)
+        return self.with_warnings(judgement)
+
+    def _with_rays(self, alone: Judgement, scans: WindowOfScans) -> NDArray[np.float32]:
+        """Probabilities of rain by the model and by the rays of other scans, float32 (N,)."""
+        doubtful = np.flatnonzero(alone.probability > DOUBTFUL)
+        others = [(other, scans.judged.to(other)) for other in (*scans.before, *scans.after)]
+        known = {
+            other.scan: to_other
+            for other, to_other in others
+            if to_other is not None and len(self._rays_of(other.scan))
+        }
+        solid = evenly(np.flatnonzero(alone.judged & (alone.probability <= DOUBTFUL)), CHECKED)
+        if not (known and len(solid)):
+            return alone.probability
+        evidence = self._evidence(alone.scan, solid, doubtful, known)
+        if evidence is None:
+            self._unlike[alone.scan] = True
+            return alone.probability
+        probability = alone.probability.copy()
+        certain = np.finfo(np.float64).eps
+        before = np.clip(probability[doubtful].astype(np.float64), certain, 1 - certain)
+        log_odds = np.log(before / (1 - before)) + SHARE_ADDED * added_log_odds(evidence)
+        probability[doubtful] = 1 / (1 + np.exp(-log_odds))
+        return probability
+
+    def _evidence(
+        self,
+        scan: Scan,
+        solid: NDArray[np.int64],
+        doubtful: NDArray[np.int64],
+        others: Mapping[Scan, NDArray[np.float64]],
+    ) -> RayEvidence | None:
+        """What the rays of other scans show at the doubtful points; None where none shows the same.
+
+        Args:
+            scan: The scan.
+            solid: Rows of points that the model takes for solid, int64 (Q,), one or more.
+            doubtful: Rows of the doubtful points, int64 (D,).
+            others: Other scans, and what takes the frame of this one to theirs.
+        """
+        found = []
+        rows = np.concatenate([solid, doubtful])
+        for other, transform in others.items():
+            # A scan that is there twice shows its own drops as what persists.
+            if np.array_equal(other.xyz, scan.xyz, equal_nan=True):
+                continue
+            places = scan.xyz[rows] @ transform[:3, :3].T + transform[:3, 3]
+            seen = ray_evidence(places, self._rays_of(other), self._rays_of(scan).step)
+            of_solid, of_doubtful = seen[: len(solid)], seen[len(solid) :]
+            if of_solid.ending.sum() > of_solid.through.sum():
+                found.append(of_doubtful)
+        return mean_evidence(found) if found else None
+
+    def _rays_of(self, scan: Scan) -> Rays:
+        if scan not in self._rays:
+            self._rays[scan] = Rays.of(scan, self.model.threads)
+        return self._rays[scan]
+
+
+def added_log_odds(evidence: RayEvidence) -> NDArray[np.float64]:
+    """Log-odds of rain by the rays of other scans, float64 (M,); 0 where none is near."""
+    return OF_ENDING * evidence.ending + OF_THROUGH * evidence.through

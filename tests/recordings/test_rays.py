@@ -1,0 +1,115 @@
+"""What rays of another scan show of places: closed forms, and brute force."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from derain.recordings.rays import (
+    ENDS_AT,
+    HALF_WEIGHT_AT,
+    LEAST_WEIGHT,
+    RAYS,
+    WENT_THROUGH,
+    WITHIN,
+    WITHIN_STEPS,
+    Rays,
+    range_of,
+    ray_evidence,
+)
+
+# A quarter of a degree, as far as the rays of many sensors lie apart.
+STEP = np.radians(0.25)
+
+
+def wall(distance: float, rows: int = 24, columns: int = 40) -> NDArray[np.float64]:
+    """Points of a wall across x, seen by evenly spaced rays, (rows * columns, 3)."""
+    inclination, azimuth = np.meshgrid(
+        (np.arange(rows) - rows / 2 + 0.5) * STEP, (np.arange(columns) - columns / 2) * STEP
+    )
+    y, z = np.tan(azimuth.ravel()), np.tan(inclination.ravel()) / np.cos(azimuth.ravel())
+    return distance * np.stack([np.ones_like(y), y, z], axis=1)
+
+
+def moved(x: float, yaw: float = 0.0) -> NDArray[np.float64]:
+    motion = np.eye(4)
+    motion[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
+    motion[0, 3] = x
+    return motion
+
+
+def test_rays_end_at_a_wall_and_go_through_a_drop_before_it() -> None:
+    drop = np.array([[6.0, 0.03, 0.02]])
+    places = np.concatenate([wall(20), drop])
+    evidence = ray_evidence(places, Rays(wall(20), 1), STEP)
+    of_drop = np.abs(places[:, 0] - 6) < 0.1
+    assert evidence.ending[of_drop] == 0
+    assert evidence.through[of_drop] == pytest.approx(1)
+    assert evidence.ending[~of_drop] == pytest.approx(1)
+    assert (evidence.through[~of_drop] == 0).all()
+
+
+def test_a_sensor_that_moved_sees_the_same() -> None:
+    motion = moved(1.3, 0.02)
+    drop = np.array([[6.0, 0.03, 0.02]])
+    before = wall(20)
+    after = (np.concatenate([before, drop]) - motion[:3, 3]) @ motion[:3, :3]
+    places = after @ motion[:3, :3].T + motion[:3, 3]
+    evidence = ray_evidence(places, Rays(before, 1), STEP)
+    middle = np.abs(after[:, 1]) < 1
+    assert evidence.through[-1] == pytest.approx(1)
+    assert np.median(evidence.ending[middle]) == pytest.approx(1)
+
+
+def test_a_ray_that_comes_back_tells_more_than_those_around_it() -> None:
+    twig = wall(10)[[500]] * 0.6
+    again = np.delete(wall(10), 500, axis=0)  # the ray to the twig ends there, not at the wall
+    evidence = ray_evidence(twig, Rays(np.concatenate([again, twig]), 1), STEP)
+    assert evidence.ending[0] > 0.4 > 1 / RAYS
+
+
+def test_what_stands_before_a_place_says_nothing_of_it() -> None:
+    evidence = ray_evidence(wall(20), Rays(wall(10), 1), STEP)
+    assert not evidence.ending.any()
+    assert not evidence.through.any()
+
+
+def test_where_there_are_no_rays_nothing_is_said() -> None:
+    places = wall(20)
+    for other in (-wall(20), np.zeros((0, 3)), wall(20)[:3]):
+        evidence = ray_evidence(places, Rays(other, 1), STEP)
+        assert not evidence.through.any()
+        assert evidence.ending.shape == (len(places),)
+    nobody = ray_evidence(places[:0], Rays(places, 1), STEP)
+    assert nobody.ending.shape == (0,)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_it_is_what_asking_every_ray_says(seed: int) -> None:
+    generator = np.random.default_rng(seed)
+    clouds = [
+        wall(generator.uniform(5, 30), 6, 8) * generator.uniform(0.97, 1.03, (48, 1))
+        for _ in range(2)
+    ]
+    motion, other = moved(*generator.uniform(-0.05, 0.05, 2)), clouds[1]
+    places = clouds[0] @ motion[:3, :3].T + motion[:3, 3]
+    evidence = ray_evidence(places, Rays(other, 1), STEP)
+    within = max(np.radians(WITHIN), WITHIN_STEPS * STEP)
+    for number, place in enumerate(places):
+        reach = np.linalg.norm(place)
+        ends = np.linalg.norm(other, axis=1)
+        chords = np.linalg.norm(other / ends[:, None] - place / reach, axis=1)
+        near = np.argsort(chords, kind="stable")[:RAYS]
+        near = near[chords[near] <= within]
+        heard = 1 / (1 + (chords[near] / np.radians(HALF_WEIGHT_AT)) ** 2)
+        total = max(heard.sum(), LEAST_WEIGHT)
+        behind = ends[near] - reach
+        at, through = (offset + slope * reach for offset, slope in (ENDS_AT, WENT_THROUGH))
+        ending = heard[np.abs(behind) <= at].sum() / total
+        assert evidence.ending[number] == pytest.approx(ending)
+        assert evidence.through[number] == pytest.approx(heard[behind > through].sum() / total)
+
+
+def test_a_range_is_never_nothing() -> None:
+    assert (range_of(np.zeros((2, 3))) > 0).all()

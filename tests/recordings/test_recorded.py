@@ -1,0 +1,109 @@
+"""A model over a recording: rays of other scans speak for drops, against walls, or not at all."""
+
+import pickle
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from derain.errors import InputError
+from derain.export.recorded import RecordedDerainer, added_log_odds
+from derain.export.runtime import Derainer
+from derain.recordings.rays import RayEvidence
+from derain.scan import Scan
+from derain.sources.frame import MemoryFrame
+from derain.sources.judgement import Judgement
+from derain.sources.judging import judgements
+from derain.system.stopwatch import Stopwatch
+from derain.views.window import Window
+
+from .test_persistence import drive, is_drop
+
+
+class Doubtful(Derainer):
+    """Doubts every drop, and one of ten points of walls; takes all else for solid."""
+
+    def judge_silently(self, points: Scan, stopwatch: Stopwatch | None = None) -> Judgement:
+        doubted = is_drop(points) | (np.arange(len(points)) % 10 == 0)
+        probability = np.where(doubted, np.float32(0.3), np.float32(0.001))
+        return Judgement(probability, probability > 0.4, points.valid, points)
+
+
+@pytest.fixture(scope="module")
+def model() -> Derainer:
+    return Doubtful(threads=2)
+
+
+def judged(
+    model: Derainer, frames: Sequence[MemoryFrame], past: int = 1, delay: int = 1
+) -> list[Judgement]:
+    method = RecordedDerainer(model, past, delay)
+    return [judgement for _, judgement, _ in judgements(method, frames)]
+
+
+@pytest.mark.parametrize("posed", [True, False], ids=["poses", "odometry"])
+@pytest.mark.parametrize(("past", "delay"), [(1, 0), (1, 1), (0, 1)])
+def test_drops_become_likelier_and_walls_less_likely(
+    model: Derainer, posed: bool, past: int, delay: int
+) -> None:
+    for judgement in judged(model, drive(posed=posed), past, delay)[1:-1]:
+        alone, drop = model.judge(judgement.scan).probability, is_drop(judgement.scan)
+        assert (judgement.probability[alone < 0.01] == alone[alone < 0.01]).all()
+        assert (judgement.probability[drop] > 0.3).mean() > 0.7
+        assert (judgement.probability[~drop & (alone > 0.01)] < 0.3).mean() > 0.8
+
+
+def test_each_scan_is_judged_once_and_in_order(model: Derainer) -> None:
+    frames = drive()
+    answers = judged(model, frames)
+    assert [answer.frame for answer in answers] == frames
+    assert [len(answer.rain) for answer in answers] == [len(frame.scan) for frame in frames]
+    for answer in answers:
+        expected = answer.probability > model.spec.threshold
+        np.testing.assert_array_equal(answer.rain, expected)
+
+
+def test_without_anything_to_go_by_it_is_the_model(model: Derainer) -> None:
+    frames = drive(3)
+    turned = frames[1].sensor_to_world @ np.diag([-1.0, -1, 1, 1])
+    turned[:2, 3] += 30
+    jumps = [frames[0], replace(frames[1], sensor_to_world=turned), frames[2]]
+    repeats = [replace(frames[0], number=n, key=str(n)) for n in range(3)]
+    apart = [replace(frame, sequence=str(n)) for n, frame in enumerate(frames)]
+    for recording in (frames[:1], repeats, apart, jumps[:2]):
+        for judgement in judged(model, recording):
+            alone = model.judge(judgement.scan)
+            np.testing.assert_array_equal(judgement.probability, alone.probability)
+
+
+def test_a_scan_that_is_there_twice_is_reported_and_one_of_which_nothing_is_known_is_not(
+    model: Derainer,
+) -> None:
+    first, second = (replace(frame, sensor_to_world=None) for frame in drive(2))
+    elsewhere = replace(second, scan=replace(second.scan, xyz=first.scan.xyz[::-1] * 7))
+    for follower, unlike in ((replace(first, number=1), True), (second, False), (elsewhere, False)):
+        method = RecordedDerainer(model)
+        *_, last = [judgement for _, judgement, _ in judgements(method, [first, follower])]
+        kinds = [issue.kind for issue in method.issues(last)]
+        assert ("unlike the scans around it" in kinds) is unlike
+
+
+def test_a_copy_begins_a_recording_of_its_own(model: Derainer) -> None:
+    method = RecordedDerainer(model, past=2, delay=1)
+    method.push(drive(1)[0])
+    copy = pickle.loads(pickle.dumps(method))
+    assert (copy.window, copy.waiting, method.waiting) == (Window(2, 1), 0, 1)
+    assert copy.as_dict() == model.as_dict() | {"past": 2, "delay": 1}
+
+
+def test_impossible_windows_are_refused(model: Derainer) -> None:
+    with pytest.raises(InputError, match="-1 scans before"):
+        RecordedDerainer(model, past=-1)
+
+
+def test_where_no_ray_is_near_nothing_is_added() -> None:
+    evidence = RayEvidence(np.array([0.0, 0, 1]), np.array([0.0, 1, 0]))
+    nothing, through, ending = added_log_odds(evidence)
+    assert nothing == 0
+    assert ending < 0 < through
