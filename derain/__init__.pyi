@@ -17,7 +17,9 @@ from derain.datamodules.wads import Wads as Wads
 from derain.datamodules.worlds import Worlds as Worlds
 from derain.errors import InputError as InputError
 from derain.errors import ScanWarning as ScanWarning
+from derain.example import example_scan as example_scan
 from derain.export.bench.bench import bench as bench
+from derain.export.recorded import RecordedDerainer as RecordedDerainer
 from derain.export.runtime import Derainer as Derainer
 from derain.files import read_scan as read_scan
 from derain.files import write_scan as write_scan
@@ -29,8 +31,8 @@ from derain.filters import SOR as SOR
 from derain.filters import SSR as SSR
 from derain.filters import FilterDerainer as FilterDerainer
 from derain.models.checkpoint import load_model as load_model
-from derain.models.cues import CuedNetwork as CuedNetwork
-from derain.models.cues import CuedOutDet as CuedOutDet
+from derain.models.cues import CueFusion as CueFusion
+from derain.models.cues import CueNetwork as CueNetwork
 from derain.models.lisnownet import LiSnowNet as LiSnowNet
 from derain.models.lisnownet import LiSnowNetwork as LiSnowNetwork
 from derain.models.outdet import OutDet as OutDet

@@ -1,9 +1,10 @@
 """Shows every step from scans to a deployed model, on simulated rain.
 
-It simulates rain in streets and draws a scan of it; trains 3D-OutDet, SalsaNext and LiSnowNet-L1 on
-the scans, the last without labels; exports and proves each; cleans scans; and compares the
-networks with filters, with the model that comes with derain, and with baselines that every method
-has to beat. With --scan, the model that comes with derain then cleans scans of your own.
+First the model that comes with derain cleans two simulated scans that come along, or with --scan
+scans of your own. Then it simulates rain in streets and draws a scan of it; trains 3D-OutDet,
+SalsaNext and LiSnowNet-L1 on the scans, the last without labels; exports and proves each; cleans
+scans; and compares the networks with filters, with the model that comes with derain, and with
+baselines that every method has to beat.
 
   derain demo
   derain demo --out somewhere
@@ -24,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, default=Path("demo"), help="folder (default: demo)")
     parser.add_argument("--epochs", type=count, help="train for another number of epochs")
     parser.add_argument(
-        "--scan", type=Path, help="scan of your own, or folder of scans, to end with"
+        "--scan", type=Path, help="scan of your own, or folder of scans, to begin with"
     )
     add_columns(parser, of="your ")
 
@@ -36,14 +37,14 @@ def main(arguments: argparse.Namespace) -> int:
 
     out, epochs = arguments.out, arguments.epochs
     if arguments.scan is not None:
-        # It is cleaned minutes later; an unreadable file is refused now.
-        named_frames([arguments.scan], arguments.columns)[0].read()
+        named_frames([arguments.scan], arguments.columns)[0].read()  # refuses what cannot be read
     settings = {} if epochs is None else {"trainer.max_epochs": epochs}
     print(f"Simulated rain, from streets to a table. Everything goes to {out}/\n")
     run_demo(
         DemoConfig(out, settings=settings, scan=arguments.scan, columns=arguments.columns),
         print_lines,
     )
-    print_lines(f"Pictures: {out}/filters.png, before_after.png, bench/speed_error.png")
+    pictures = "yours/before_after.png", "filters.png", "before_after.png", "bench/speed_error.png"
+    print_lines(f"Pictures in {out}: {', '.join(pictures)}")
     print_lines(f"Training: tensorboard --logdir {out / 'runs'}")
     return 0

@@ -19,29 +19,38 @@ from derain.system.extras import TRAINING_LIBRARIES, missing_extra, require
 DESCRIPTION = """\
 Takes the rain out of LiDAR and fused LiDAR + 4D-radar scans.
 
-  derain demo                                           the whole story on simulated rain
   derain run scans/ --out cleaned                       clean scans by the model of derain's own
   derain run model.onnx scans/ --out cleaned            by another; or `run dror ...`
+  derain view scans/000000.bin --out figure.png         look at what is taken
   derain info default                                   what derain's own is, and how good
   derain bench --data scans/ --methods default dsor     speed against error
+  derain learn drive/ --out model.onnx                  learn from a recording without labels
   derain fit --config outdet_wads.yaml --data.root WADS train on your data
   derain export outdet.ckpt --out model.onnx            make a file that runs without torch
+  derain demo                                           the whole story on simulated rain
+
+Rain means rain or snow, here and in all output.
 """
 
-# What each command does. Its module, of the same name, is imported when it is chosen.
-COMMANDS = {
+# What each command does, in order of use. Its module, of the same name, is imported when it is
+# chosen; those of TRAINING are Lightning's own, which parses their arguments itself.
+SUMMARIES = {
     "run": "clean scans on a CPU, without torch",
-    "bench": "compare methods on labelled scans: error, time and memory",
-    "tune": "find a method's best parameters on labelled scans",
     "view": "look at a scan, or a recording, as several methods clean it",
     "info": "describe a scan, a label file, a model or a data set",
+    "bench": "compare methods on labelled scans: error, time and memory",
+    "learn": "a derainer from an unlabelled recording, in about six minutes",
+    "tune": "find a method's best parameters on labelled scans",
+    "fit": "train a derainer",
+    "validate": "measure a checkpoint on the validation scans",
+    "test": "measure a checkpoint on the test scans",
+    "predict": "write the labels that a checkpoint gives the test scans",
     "export": "make an ONNX file that runs on a CPU without torch",
     "import-weights": "make a checkpoint from published weights",
     "simulate": "make a data set of simulated rain, or let it rain on clean scans",
     "annotate": "label the scans of a static scene by its geometry",
     "teach": "label recordings by a method, for a network to learn from",
     "fuse": "merge the frames of a LiDAR and of a 4D radar",
-    "learn": "a derainer from an unlabelled recording, in about six minutes",
     "odometry": "find where the sensor was, scan by scan",
     "demo": "the whole story on simulated rain, in about six minutes",
 }
@@ -49,13 +58,8 @@ COMMANDS = {
 # Exit code if the reader of the output closes the pipe, as of programs that SIGPIPE ends.
 BROKEN_PIPE = 128 + 13
 
-# Lightning's own, which parses its arguments itself.
-TRAINING = {
-    "fit": "train a derainer",
-    "validate": "measure a checkpoint on the validation scans",
-    "test": "measure a checkpoint on the test scans",
-    "predict": "write the labels that a checkpoint gives the test scans",
-}
+TRAINING = ("fit", "validate", "test", "predict")
+COMMANDS = tuple(name for name in SUMMARIES if name not in TRAINING)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -171,7 +175,7 @@ def _parser(command: str | None) -> Parser:
     )
     parser.add_argument("--version", action="version", version=f"derain {__version__}")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for name, summary in (TRAINING | COMMANDS).items():
+    for name, summary in SUMMARIES.items():
         of_command = subparsers.add_parser(
             name, help=summary, formatter_class=argparse.RawDescriptionHelpFormatter
         )

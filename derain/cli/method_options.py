@@ -10,6 +10,7 @@ from derain.cli.options import add_threads
 from derain.cli.parser import Parser
 from derain.default import DEFAULT
 from derain.errors import InputError
+from derain.example import or_example
 from derain.export.methods import (
     CHECKPOINT_SUFFIX,
     PARAMETER_SUFFIXES,
@@ -176,8 +177,8 @@ def method_and_scans(first: str, others: list[Path]) -> tuple[str, list[Path]]:
         InputError: A first word that is neither, or could be both where that matters; a method
             without scans.
     """
-    path = Path(first)
-    folder, in_bag = os.path.isdir(first), split(path) is not None
+    path = or_example(Path(first))
+    folder, in_bag = os.path.isdir(path), split(path) is not None
     there = folder or in_bag or is_file(path)
     of_method = path.suffix in METHOD_SUFFIXES and not folder
     named = of_method or (not path.suffix and is_method_name(first))

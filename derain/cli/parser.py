@@ -31,8 +31,15 @@ def number(text: str) -> float:
     return value
 
 
+# Shows the options that are rarely used, too.
+HELP_ALL = "--help-all"
+
+
 class Parser(argparse.ArgumentParser):
     """Raises InputError for a command line that it cannot understand.
+
+    Where it has options that are rarely used, ``--help`` fits a screen: it ends its description
+    with the first examples and leaves out those options, which ``--help-all`` shows.
 
     Attributes:
         late_epilog: Makes the end of the help when help is asked for; None where it has none.
@@ -42,12 +49,38 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
+        self._rare: list[argparse.Action] = []
         # Instead of int and float, whose names would appear in the messages.
         self.register("type", int, whole)
         self.register("type", float, number)
 
+    def use_rarely(self, *options: str) -> None:
+        """Leaves options to ``--help-all``.
+
+        Args:
+            options: Each by one of its names.
+        """
+        self._rare += [self._option_string_actions[option] for option in options]
+        if HELP_ALL not in self._option_string_actions:
+            text = "show all options, and what there is to know of them"
+            self.add_argument(HELP_ALL, action=_HelpAll, nargs=0, help=text)
+
     def format_help(self) -> str:
-        """The help, with its end."""
+        """The help, short where some options are rarely used, with its end."""
+        whole_help = {action: action.help for action in self._rare}, self.description
+        try:
+            if self._rare:
+                self.description = _first_examples(self.description or "")
+                for action in self._rare:
+                    action.help = argparse.SUPPRESS
+            return self.format_whole_help()
+        finally:
+            helps, self.description = whole_help
+            for action, text in helps.items():
+                action.help = text
+
+    def format_whole_help(self) -> str:
+        """The help with all options, and with its end."""
         if self.late_epilog is not None:
             self.epilog = self.late_epilog()
         return super().format_help()
@@ -95,3 +128,19 @@ class Parser(argparse.ArgumentParser):
         text = re.sub(r" *\\\n *", " ", self.description or "")
         found = re.search(rf"^ *({self.prog} \S.*?)(  |$)", text, re.MULTILINE)
         return found[1] if found else f"{self.prog} --help"
+
+
+class _HelpAll(argparse.Action):
+    """Prints the whole help and ends the program."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
+        assert isinstance(parser, Parser)
+        print(parser.format_whole_help(), end="")
+        parser.exit()
+
+
+def _first_examples(description: str) -> str:
+    """A description up to the end of its first examples, which are indented."""
+    paragraphs = description.split("\n\n")
+    with_examples = [place for place, text in enumerate(paragraphs) if text.startswith("  ")]
+    return "\n\n".join(paragraphs[: with_examples[0] + 1 if with_examples else None])

@@ -1,20 +1,24 @@
-"""Cleans scans with an exported model or a filter.
+"""Cleans scans with an exported model or a filter: takes rain and snow out of them.
 
 Writes <stem>.label (1 = rain, one per row of the input) and the scan without its rain, in the
-format of the input with all its fields. With --weather, --fail-at, --dry or --json it measures the
-weather of every scan; otherwise of five scans, for the last line.
+format of the input with all its fields.
 
+  derain run example --out cleaned            two simulated scans that come along
   derain run scans/ --out cleaned
+  derain run drive/ --out cleaned --poses poses.txt
   derain run model.onnx scan.bin --out cleaned
+  derain run dror scans/ --out cleaned --removed removed
+  derain run drive.mcap --out cleaned --removed-topic /rain
+  derain run scans/ --out cleaned --weather weather.csv
+
   derain run model.onnx scans/ more/scan.pcd --out cleaned --threads 2 --json
   derain run model.onnx nuscenes/ --out cleaned --columns x,y,z,intensity,ring
   derain run model.onnx scans/ --out cleaned --runtime openvino --precision bf16
-  derain run dror scans/ --out cleaned
   derain run dror WADS/ --out cleaned
   derain run best.yaml scans/ --out cleaned
   derain run dsor scans/ --out cleaned --parameters best.yaml --set range_multiplier=0.08
   derain run persistence recording/ --out cleaned --poses poses.txt
-  derain run drive.mcap --out cleaned --removed-topic /rain
+  derain run drive/ --out cleaned --past 3 --delay 0
   derain run scans/ --out cleaned --removed removed --probability
   derain run scans/ --out cleaned --weather weather.csv --warning 30 40 --error 15 20 --hold 5
   derain run scans/ --out cleaned --json --fail-at error
@@ -23,6 +27,9 @@ METHOD is a model from `derain export` (.onnx), parameters from `derain tune` (.
 (below).
 METHOD is optional: if the first word is a folder or a scan, the model that comes with derain cleans
 all scans. Write ./crf for a folder called crf.
+The model that comes with derain judges the scans of a recording by the scans around them, too:
+solid things are where they were, rain is not. Where the sensor was comes from the poses, or else
+from the scans; where that is not known, or with --alone, each scan is judged by itself.
 Methods that see several scans need the scans of a recording in time order. Where a method is not
 sure of a point, its best guess decides. Results of a data set are named by their paths in it.
 A bag (.bag of ROS 1; .mcap, .db3 or a folder of ROS 2) becomes a bag of the same name: the clouds
@@ -30,6 +37,8 @@ of one topic have no rain, and everything else stays the same, byte for byte.
 derain warns once of each fault of the scans. It skips scans with more than --most-removed rain: it
 writes no file for them, and leaves the clouds of bags as they are. It also skips scans that it
 cannot read. The exit code is then 2.
+With --weather, --fail-at, --dry or --json it measures the weather of every scan; otherwise of five
+scans, for the last line.
 Visibility is the range that 90 % of the rays would reach if rain were as dense everywhere as in the
 first 10 m. It compares scans of one sensor; a weather station measures something else. Fog without
 returns shows only in comparison with dry scans of the sensor (--dry).
@@ -62,18 +71,34 @@ from derain.cli.weather_options import (
 )
 from derain.default import DEFAULT, model_card
 from derain.errors import InputError
+from derain.example import Truth
+from derain.export.runtime import Derainer
 from derain.sources.clean_sink import CleanSink, require_probabilities
 from derain.sources.cleaned_bags import RAIN_PROBABILITY, BagOptions
 from derain.sources.cleaning import CleanedScan, CleaningObserver, CleanReport, clean
 from derain.sources.folders import named_frames
 from derain.sources.frame import time_of
 from derain.sources.judgement import Judgement
+from derain.sources.method import Method
 from derain.sources.recordings import irregularities
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
 from derain.views.scan_issues import MOST_RAIN, ScanIssue
 from derain.weather.record import weather_row
 from derain.workflows.odometry import placed
+
+# Scans before and after each that a model sees by default, as far as they are of its recording.
+PAST, DELAY = 1, 1
+
+# Options that only --help-all shows.
+RARE = (
+    *("--runtime", "--precision", "--parameters", "--columns", "--intensity-scale"),
+    *("--probability", "--most-removed", "--past", "--delay", "--topic", "--cleaned-topic"),
+    *("--removed-topic", "--keep-shape", "--dry", "--warning", "--error", "--hold"),
+)
+
+# The network that sees them unasked.
+CUES = "cues"
 
 
 def add_arguments(parser: Parser) -> None:
@@ -97,6 +122,13 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument(
         "--probability", action="store_true", help=f"add the column {RAIN_PROBABILITY} to the scans"
     )
+    parser.add_argument(
+        "--past", type=int, metavar="N", help=f"see N scans before each (default: {PAST})"
+    )
+    parser.add_argument(
+        "--delay", type=int, metavar="N", help=f"see N scans after each (default: {DELAY})"
+    )
+    parser.add_argument("--alone", action="store_true", help="judge each scan by itself")
     add_poses(parser)
     add_topic(parser)
     parser.add_argument(
@@ -113,6 +145,7 @@ def add_arguments(parser: Parser) -> None:
         help="bags: keep rows and columns of organised clouds; removed points become NaN",
     )
     add_weather(parser)
+    parser.use_rarely(*RARE)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -126,6 +159,9 @@ def main(arguments: argparse.Namespace) -> int:
     )
     if arguments.probability:
         require_probabilities(method, source)
+    # What does without the scans around each need not be warned of scans that have none.
+    needed = method.window
+    method = _over_recording(method, arguments, len(source))
     weather = weather_options(arguments)
     sink = CleanSink(
         arguments.out,
@@ -138,7 +174,7 @@ def main(arguments: argparse.Namespace) -> int:
         printer = _Printer(rows, arguments.json)
         if name == DEFAULT:
             printer.introduce_default()
-        for sentence in irregularities(source, method.window):
+        for sentence in irregularities(source, needed):
             warn(sentence)
         report = clean(
             source,
@@ -153,6 +189,29 @@ def main(arguments: argparse.Namespace) -> int:
     return failed or warn_of_bad_weather(report.weather, arguments.fail_at)
 
 
+def _over_recording(method: Method, arguments: argparse.Namespace, scans: int) -> Method:
+    """The method that sees the scans around each, where the command line or the model asks for it.
+
+    Raises:
+        InputError: Scans around each for a method that is no model, or that is to see one alone.
+    """
+    asked = arguments.past is not None or arguments.delay is not None
+    if arguments.alone and (asked or not method.window.is_one_scan):
+        reason = "excludes --past and --delay, and methods that need the scans around each"
+        raise InputError("--alone", reason, "Leave it out.")
+    if asked and not isinstance(method, Derainer):
+        raise InputError("--past, --delay", "are options of models", "Leave them out.")
+    of_itself = isinstance(method, Derainer) and method.spec.network == CUES and scans > 1
+    if isinstance(method, Derainer) and (asked or (of_itself and not arguments.alone)):
+        from derain.export.recorded import RecordedDerainer  # a single scan needs no odometry
+
+        past, delay = arguments.past, arguments.delay
+        return RecordedDerainer(
+            method, PAST if past is None else past, DELAY if delay is None else delay
+        )
+    return method
+
+
 class _Printer(CleaningObserver):
     """Prints what is done to the scans, and makes a row of a table of the weather of each."""
 
@@ -160,6 +219,7 @@ class _Printer(CleaningObserver):
         self._notices = Notices()
         self._rows = rows
         self._as_json = as_json
+        self._example = Truth()
         self._stream = sys.stderr if as_json else sys.stdout
 
     def introduce_default(self) -> None:
@@ -175,6 +235,10 @@ class _Printer(CleaningObserver):
         self._notices.warn_of_repeats()
         if len(report.scans) > 1:
             print(report, file=self._stream, flush=True)
+        if self._example.rain:
+            print_lines(
+                f"{self._example} Look at it: derain view example --out figure.png", self._stream
+            )
 
     def judged(self, judgement: Judgement, odd: list[ScanIssue]) -> None:
         """Warns of what is odd about a scan."""
@@ -188,6 +252,7 @@ class _Printer(CleaningObserver):
             row = weather_row(scan.weather, judgement.weather)
             self._rows.append([scan.scan, time_of(judgement.frame), *row])
         print_facts(asdict(scan), str(scan), self._as_json)
+        self._example.add(judgement.frame.name, judgement.rain)
 
     def failed(self, error: InputError) -> None:
         """Prints why a scan is not cleaned."""

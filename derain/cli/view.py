@@ -46,6 +46,7 @@ from derain.cli.parser import Parser, whole
 from derain.cli.playback import refuse_unusable, write_and_report
 from derain.default import DEFAULT
 from derain.errors import InputError
+from derain.example import example_file, or_example
 from derain.export.methods import load_method, named_method, split_title
 from derain.sources.bag_frame import NUMBER, BagFrame
 from derain.sources.folders import frame_of, named_frames
@@ -124,6 +125,8 @@ def main(arguments: argparse.Namespace) -> int:
             raise InputError("--rerun", "excludes --out and --window", "Leave them out.")
         return _view_recording(arguments)
     path = arguments.scans[0]
+    if or_example(path) != path:
+        path = example_file()
     if len(arguments.scans) > 1 or (path.is_dir() and not is_bag(path)):
         raise InputError(
             path,

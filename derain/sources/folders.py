@@ -13,6 +13,7 @@ from derain.bags.names import bags_at, is_bag, split
 from derain.cards.known import known_layouts, label_of
 from derain.cards.layout import Layout, sequence_of
 from derain.errors import InputError
+from derain.example import or_example
 from derain.files import DEFAULT_COLUMNS, RECORDS, find_scans
 from derain.files.format import FORMATS
 from derain.files.names import scan_stem, scan_suffix
@@ -48,7 +49,7 @@ def named_frames(
     Args:
         paths: One path or several: scans, folders with scans directly in them, data sets or parts
             of them whose folders are named as in a layout, bags, and paths into bags
-            (:func:`~derain.sources.bag_frame.bag_frames`).
+            (:func:`~derain.sources.bag_frame.bag_frames`); or ``example``, which comes with derain.
         columns: Names of the columns of files that do not name them.
         labelled: Whether labels are to be read, from where :func:`~derain.cards.known.label_of`
             finds them by the layouts.
@@ -65,7 +66,8 @@ def named_frames(
         InputError: A path that does not exist, a folder without scans, or a bag that cannot be
             read.
     """
-    named = [Path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]
+    given = [paths] if isinstance(paths, str | Path) else paths
+    named = [or_example(Path(path)) for path in given]
     found = [_scans_or_bags(path, layouts) for path in named]
     scans = [scan for of_path, _ in found for scan in of_path]
     # A data set's scans lie in several folders, those of any other path in one.

@@ -33,6 +33,14 @@ def test_the_help_of_a_command_starts_with_examples_of_it(succeed, command: str)
     assert max(map(len, str(module_of(command).__doc__).splitlines())) <= 100
 
 
+def test_the_help_of_run_fits_a_screen_and_help_all_has_every_option(succeed) -> None:
+    short, whole = succeed("run", "--help").out, succeed("run", "--help-all").out
+    assert len(short.splitlines()) < 60
+    assert {"--runtime", "--columns", "--hold"}.isdisjoint(short.split())
+    assert {"--out", "--runtime", "--columns", "--hold", "--help-all"} <= set(whole.split())
+    assert str(module_of("run").__doc__) in whole
+
+
 @pytest.mark.parametrize("arguments", [["wash"], [], ["run"], ["run", "model.onnx", "scan.bin"]])
 def test_a_command_that_cannot_be_understood_exits_with_2(refused, arguments) -> None:
     line = refused(*arguments)

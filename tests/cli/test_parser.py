@@ -46,10 +46,10 @@ def test_a_value_that_an_option_cannot_have_is_refused_in_words(
 @pytest.mark.parametrize(
     ("words", "named"),
     [
-        ("run", ("run: ", "SCAN, --out", "`derain run scans/ --out cleaned`")),
-        ("run --out o", ("run: ", " SCAN.", "`derain run scans/ --out cleaned`")),
+        ("run", ("run: ", "SCAN, --out", "`derain run example --out cleaned`")),
+        ("run --out o", ("run: ", " SCAN.", "`derain run example --out cleaned`")),
         ("bench", ("--data, --methods, --out", " all none --out bench`")),
-        ("", ("COMMAND", "`derain demo`")),
+        ("", ("COMMAND", "`derain run scans/ --out cleaned`")),
         ("ruun", ("there is no ruun", "Did you mean run?")),
         ("run dror s --outt o", ("--outt: ", "Did you mean --out?")),
         ("run dror s --out o --gpu", ("--gpu: ", "on the CPU")),

@@ -70,5 +70,5 @@ def test_commands_list_the_formats_what_they_need_and_which_do_not_name_their_co
     told = run_derain("info", "--formats").out
     assert all(suffix in told and FORMATS[suffix].HELP in told for suffix in FORMATS)
     assert re.search(r"^  \.las, \.laz +laser surveys \(needs derain\[las\]\)$", told, re.M)
-    help_of_run = " ".join(run_derain("run", "--help").out.split())
+    help_of_run = " ".join(run_derain("run", "--help-all").out.split())
     assert ".bin, .npy, .npz of one array, text without a line of names" in help_of_run
