@@ -18,7 +18,7 @@ from derain.sources.judgement import Judgement
 from derain.sources.method import Method
 from derain.sources.recent_frames import FrameInWindow
 from derain.system.stopwatch import Stopwatch
-from derain.views.morton import evenly
+from derain.views.morton import distinct_rows, evenly
 from derain.views.scan_issues import ScanIssue
 from derain.views.window import Window, WindowOfScans
 
@@ -42,10 +42,10 @@ CHECKED = 2000
 class RecordedDerainer(Method):
     """Judges the scans of a recording by a model, and by the rays of the scans around each.
 
-    Rays of another scan that end where a point is show something solid there, and those that went
-    through the place show that nothing was. Where the sensor was comes from the poses of the
-    frames, or else from odometry. A scan of which that is not known, or whose pose does not match
-    what it shows, is judged alone.
+    Rays of another scan that end where a point is show something solid there, unless the model
+    takes their own ends for rain. Those that went through the place show that nothing was. Where
+    the sensor was comes from the poses of the frames, or else from odometry. A scan of which that
+    is not known, or whose pose does not match what it shows, is judged alone.
 
     Example:
         >>> derainer = RecordedDerainer(Derainer("model.onnx"), past=1)
@@ -134,12 +134,17 @@ class RecordedDerainer(Method):
     def _end_recording(self) -> None:
         self._frames = PlacedFrames(self.window, self.model.threads)
         self._rays: WeakKeyDictionary[Scan, Rays] = WeakKeyDictionary()
+        self._alone: dict[Scan, Judgement] = {}
         self._unlike: WeakKeyDictionary[Scan, bool] = WeakKeyDictionary()
 
     def _judged(self, ready: FrameInWindow, stopwatch: Stopwatch) -> Judgement:
-        alone = self.model.judge_silently(ready.scans.scan, stopwatch)
+        scans = ready.scans
+        seen = [one.scan for one in (scans.judged, *scans.before, *scans.after)]
+        # Of no scan that is not seen any more: each judgement holds its scan.
+        self._alone = {scan: self._alone_of(scan, stopwatch) for scan in seen}
+        alone = self._alone[scans.scan]
         with stopwatch.stage("rays"):
-            probability = self._with_rays(alone, ready.scans)
+            probability = self._with_rays(alone, scans)
         rain = probability > self.model.spec.threshold
         judgement = replace(alone, probability=probability, rain=rain, frame=ready.frame)
         return self.with_warnings(judgement)
@@ -189,11 +194,18 @@ class RecordedDerainer(Method):
             if np.array_equal(other.xyz, scan.xyz, equal_nan=True):
                 continue
             places = scan.xyz[rows] @ transform[:3, :3].T + transform[:3, 3]
-            seen = ray_evidence(places, self._rays_of(other), self._rays_of(scan).step)
+            rays, step = self._rays_of(other), self._rays_of(scan).step
+            at_drops = self._alone[other].rain[distinct_rows(other)[0]]
+            seen = ray_evidence(places, rays, step, at_drops)
             of_solid, of_doubtful = seen[: len(solid)], seen[len(solid) :]
             if of_solid.ending.sum() > of_solid.through.sum():
                 found.append(of_doubtful)
         return mean_evidence(found) if found else None
+
+    def _alone_of(self, scan: Scan, stopwatch: Stopwatch) -> Judgement:
+        """The judgement of a scan by itself, which is made once."""
+        known = self._alone.get(scan)
+        return self.model.judge_silently(scan, stopwatch) if known is None else known
 
     def _rays_of(self, scan: Scan) -> Rays:
         if scan not in self._rays:

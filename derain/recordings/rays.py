@@ -137,13 +137,20 @@ class RayEvidence:
         return RayEvidence(self.ending[places], self.through[places])
 
 
-def ray_evidence(places: NDArray[np.float64], rays: Rays, step: float) -> RayEvidence:
+def ray_evidence(
+    places: NDArray[np.float64],
+    rays: Rays,
+    step: float,
+    at_drops: NDArray[np.bool_] | None = None,
+) -> RayEvidence:
     """Finds how the rays of a scan pass some places.
 
     Args:
         places: float64 (M, 3), metres, in the frame of the rays.
         rays: The rays.
         step: Angle between the beams of the scan that the places are of, radians.
+        at_drops: Which of the rays end at a drop, as far as that is known, bool (R,): they show
+            nothing solid there.
 
     Returns:
         The evidence; zeros where no ray is near.
@@ -155,10 +162,13 @@ def ray_evidence(places: NDArray[np.float64], rays: Rays, step: float) -> RayEvi
     near = angles <= max(np.radians(WITHIN), WITHIN_STEPS * step)
     behind = rays.range.take(near_rays) - reach[:, None]
     at, through = (offset + slope * reach[:, None] for offset, slope in (ENDS_AT, WENT_THROUGH))
+    ending = np.abs(behind) <= at
+    if at_drops is not None:
+        ending &= ~at_drops[near_rays]
     weight = near / (1 + np.square(angles / np.radians(HALF_WEIGHT_AT)))
     total_weight = np.maximum(weight.sum(axis=1), LEAST_WEIGHT)
     return RayEvidence(
-        (weight * (np.abs(behind) <= at)).sum(axis=1) / total_weight,
+        (weight * ending).sum(axis=1) / total_weight,
         (weight * (behind > through)).sum(axis=1) / total_weight,
     )
 

@@ -113,3 +113,14 @@ def test_it_is_what_asking_every_ray_says(seed: int) -> None:
 
 def test_a_range_is_never_nothing() -> None:
     assert (range_of(np.zeros((2, 3))) > 0).all()
+
+
+def test_a_ray_that_ends_at_a_drop_shows_nothing_solid() -> None:
+    places, rays = wall(20), Rays(wall(20), 1)
+    drops = np.arange(len(rays)) % 2 == 0
+    all_solid, none_solid = np.zeros(len(rays), bool), np.ones(len(rays), bool)
+    known = ray_evidence(places, rays, STEP)
+    np.testing.assert_array_equal(ray_evidence(places, rays, STEP, all_solid).ending, known.ending)
+    assert not ray_evidence(places, rays, STEP, none_solid).ending.any()
+    some = ray_evidence(places, rays, STEP, drops).ending
+    assert 0 < some.mean() < known.ending.mean()

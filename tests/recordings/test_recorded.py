@@ -1,6 +1,8 @@
 """A model over a recording: rays of other scans speak for drops, against walls, or not at all."""
 
+import gc
 import pickle
+import weakref
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -107,3 +109,13 @@ def test_where_no_ray_is_near_nothing_is_added() -> None:
     nothing, through, ending = added_log_odds(evidence)
     assert nothing == 0
     assert ending < 0 < through
+
+
+def test_scans_that_are_no_longer_seen_are_let_go(model: Derainer) -> None:
+    method, judged_scans = RecordedDerainer(model, past=1, delay=1), []
+    for frame in drive(5):
+        if (judgement := method.push(frame)) is not None:
+            judged_scans.append(weakref.ref(judgement.scan))
+        del judgement
+    gc.collect()
+    assert [scan() is None for scan in judged_scans] == [True, True, False, False]
