@@ -35,6 +35,7 @@ from derain.recordings.rays import RayEvidence, mean_evidence
 from derain.sources.frame import Frame
 from derain.sources.recordings import recordings_of
 from derain.system.cores import usable_cores
+from derain.views.morton import distinct_rows
 
 
 @dataclass(frozen=True)
@@ -43,12 +44,14 @@ class Described:
 
     Attributes:
         rays: Where rays of other scans end, and where they went through.
+        rays_to_solid: The same, where rays that end at what the model calls rain end at nothing.
         surroundings: How the points lie, float64 (M, 10).
         alone: Probability of rain by the model that comes with derain, float32 (M,).
         rain: The truth, bool (M,).
     """
 
     rays: RayEvidence
+    rays_to_solid: RayEvidence
     surroundings: NDArray[np.float64]
     alone: NDArray[np.float32]
     rain: NDArray[np.bool_]
@@ -80,20 +83,31 @@ def _described(roots: list[Path]) -> Iterator[Described]:
     for recording in recordings_of(data.source("test")):
         scans = [data.read(frame) for frame in recording]
         points = [ScanPoints.of(scan, usable_cores()) for scan in scans]
+        rows = [distinct_rows(scan)[0] for scan in scans]
+        alone = [model.judge(scan) for scan in scans]
+        drops = [judged.rain[first] for judged, first in zip(alone, rows, strict=True)]
         for place in range(1, len(recording) - 1):
-            first = _first_rows(points[place])
-            alone = model.probability(scans[place])[first]
-            rain = card.rain_of(scans[place])[first]
-            surroundings = surroundings_features(points[place])
-            yield Described(_evidence(recording, points, place), surroundings, alone, rain)
+            yield Described(
+                _evidence(recording, points, place),
+                _evidence(recording, points, place, drops),
+                surroundings_features(points[place]),
+                alone[place].probability[rows[place]],
+                card.rain_of(scans[place])[rows[place]],
+            )
 
 
-def _evidence(recording: list[Frame], points: list[ScanPoints], place: int) -> RayEvidence:
+def _evidence(
+    recording: list[Frame],
+    points: list[ScanPoints],
+    place: int,
+    drops: list[NDArray[np.bool_]] | None = None,
+) -> RayEvidence:
     """What the rays of the scans before and after show at the points of a scan."""
     own, found = points[place], []
     for other in (place - 1, place + 1):
         to_other = np.linalg.inv(_pose(recording[other])) @ _pose(recording[place])
-        found.append(own.evidence_of(points[other], to_other))
+        at_drops = None if drops is None else drops[other]
+        found.append(own.evidence_of(points[other], to_other, at_drops))
     return mean_evidence(found)
 
 
@@ -106,7 +120,7 @@ def _added(scans: list[Described]) -> tuple[float, ...]:
     """Weights of what rays add to the model's log-odds where it is in doubt."""
     doubted = [scan.alone > DOUBTFUL for scan in scans]
     of_scans = list(zip(scans, doubted, strict=True))
-    columns = np.concatenate([_columns(scan.rays)[rows, 1:] for scan, rows in of_scans])
+    columns = np.concatenate([_columns(scan.rays_to_solid)[rows, 1:] for scan, rows in of_scans])
     alone = np.concatenate([scan.alone[rows] for scan, rows in of_scans]).astype(np.float64)
     rain = np.concatenate([scan.rain[rows] for scan, rows in of_scans])
     weight = np.concatenate([np.full(rows.sum(), 1 / max(rows.sum(), 1)) for rows in doubted])
@@ -126,14 +140,6 @@ def _pose(frame: Frame) -> NDArray[np.float64]:
     pose = frame.pose
     assert pose is not None  # simulated drives have poses
     return pose
-
-
-def _first_rows(points: ScanPoints) -> NDArray[np.int64]:
-    """A row of the scan at each point, int64 (M,)."""
-    rows = np.zeros(len(points), np.int64)
-    of_rows = np.flatnonzero(points.inverse >= 0)
-    rows[points.inverse[of_rows]] = of_rows
-    return rows
 
 
 def _fitted(

@@ -18,7 +18,7 @@ from derain.sources.judgement import Judgement
 from derain.sources.method import Method
 from derain.sources.recent_frames import FrameInWindow
 from derain.system.stopwatch import Stopwatch
-from derain.views.morton import distinct_rows, evenly
+from derain.views.morton import evenly
 from derain.views.scan_issues import ScanIssue
 from derain.views.window import Window, WindowOfScans
 
@@ -28,7 +28,7 @@ DOUBTFUL = 0.01
 # Log-odds of rain that rays of other scans add to those of the model, fitted to simulated drives by
 # benchmarks/persistence_weights.py: for the share of them that ends at a place, and for the share
 # that went through it.
-OF_ENDING, OF_THROUGH = -4.87, 0.86
+OF_ENDING, OF_THROUGH = -10.35, 0.89
 
 # How much of them is added: the model has seen part of it, and drives differ from simulated ones.
 # Source: modelling choice.
@@ -195,8 +195,7 @@ class RecordedDerainer(Method):
                 continue
             places = scan.xyz[rows] @ transform[:3, :3].T + transform[:3, 3]
             rays, step = self._rays_of(other), self._rays_of(scan).step
-            at_drops = self._alone[other].rain[distinct_rows(other)[0]]
-            seen = ray_evidence(places, rays, step, at_drops)
+            seen = ray_evidence(places, rays, step, self._alone[other].rain[rays.rows])
             of_solid, of_doubtful = seen[: len(solid)], seen[len(solid) :]
             if of_solid.ending.sum() > of_solid.through.sum():
                 found.append(of_doubtful)

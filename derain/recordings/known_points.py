@@ -57,15 +57,21 @@ class ScanPoints:
         """Distance from the sensor, metres, float64 (M,); a centimetre at least."""
         return range_of(self.xyz)
 
-    def evidence_of(self, other: Self, to_other: NDArray[np.float64]) -> RayEvidence:
+    def evidence_of(
+        self,
+        other: Self,
+        to_other: NDArray[np.float64],
+        at_drops: NDArray[np.bool_] | None = None,
+    ) -> RayEvidence:
         """What the rays of another scan show at the points of this one.
 
         Args:
             other: The other scan.
             to_other: Takes the frame of this scan to that of the other, float64 (4, 4), metres.
+            at_drops: As of :func:`ray_evidence`.
         """
         places = self.xyz @ to_other[:3, :3].T + to_other[:3, 3]
-        return ray_evidence(places, other.rays, self.rays.step)
+        return ray_evidence(places, other.rays, self.rays.step, at_drops)
 
     @cached_property
     def rays(self) -> Rays:

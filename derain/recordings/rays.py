@@ -56,9 +56,13 @@ class Rays:
     Args:
         xyz: Where they end, float (M, 3), metres, in the sensor's frame.
         threads: Threads of every search.
+        rows: Rows of the scan that they are of, int64 (M,); by default 0 to M - 1.
     """
 
-    def __init__(self, xyz: NDArray[np.floating], threads: int) -> None:
+    def __init__(
+        self, xyz: NDArray[np.floating], threads: int, rows: NDArray[np.int64] | None = None
+    ) -> None:
+        self.rows = np.arange(len(xyz)) if rows is None else rows
         wide = xyz.astype(np.float64)
         self.range = range_of(wide)
         self.directions: NDArray[np.float64] = wide / self.range[:, None]
@@ -68,7 +72,8 @@ class Rays:
     @classmethod
     def of(cls, scan: Scan, threads: int) -> "Rays":
         """The rays of the distinct valid points of a scan."""
-        return cls(scan.xyz[distinct_rows(scan)[0]], threads)
+        rows, _ = distinct_rows(scan)
+        return cls(scan.xyz[rows], threads, rows)
 
     def __len__(self) -> int:
         return len(self.range)

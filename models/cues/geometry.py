@@ -5,16 +5,14 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from derain.models.layers.across_features import AcrossFeatures
-from derain.models.layers.steps import NEIGHBOUR_NUMBERS, USUAL_RANGE
+from derain.models.layers.steps import (
+    NEIGHBOUR_NUMBERS,
+    SHELL_REACH,
+    SHELLS,
+    USUAL_RANGE,
+    active,
+)
 from derain.views.isolated_points import SHELL_MIDDLES
-
-# Slope of every activation below 0.
-NEGATIVE_SLOPE = 0.1
-
-# Shells around the sensor in which what a scan holds is averaged: logarithms of their ranges over
-# 10 m, which are 1.7 to 90 m, and how far each reaches into the next.
-SHELLS = (-1.8, 2.2, 9)
-SHELL_REACH = 0.35
 
 # Added to what is divided by, which may be 0.
 EPSILON = 1e-3
@@ -77,12 +75,12 @@ class Geometry(nn.Module):
         """
         crowded = (others[1:] == far.shape[0]).to(seen.dtype)
         seen = torch.cat([seen, crowded[None]]).flatten(1)
-        around = _active(self.neighbour(seen)).reshape(self.around, -1)
-        features = _active(self.neighbourhood(torch.cat([around, far[None]])))
+        around = active(self.neighbour(seen)).reshape(self.around, -1)
+        features = active(self.neighbourhood(torch.cat([around, far[None]])))
         features = features + self._context(features, far, counts.sum(dim=1))
-        opinions = torch.cat([_active(self.to_opinion(features)).T, self.of_crowded])
+        opinions = torch.cat([active(self.to_opinion(features)).T, self.of_crowded])
         heard = functional.embedding(others.T, opinions).flatten(1).T
-        features = features + _active(self.from_opinions.weight @ heard + self.opinions(features))
+        features = features + active(self.from_opinions.weight @ heard + self.opinions(features))
         return features, self.head(features)[0]
 
     def _context(self, features: Tensor, far: Tensor, points: Tensor) -> Tensor:
@@ -97,7 +95,7 @@ class Geometry(nn.Module):
             float (width, S).
         """
         shares = self._shares(far)
-        context = _active(self.to_context(features))
+        context = active(self.to_context(features))
         # In float64, for sums of float32 over a whole scan differ from one runtime to another, and
         # with them the logits in their third digit. With a row of ones, one product has all sums.
         one = torch.ones_like(far)[None]
@@ -111,7 +109,3 @@ class Geometry(nn.Module):
     def _shares(self, far: Tensor) -> Tensor:
         """How much each logarithm of range belongs to each centre, float (centres, S)."""
         return torch.softmax(-(((far - self.centres) / SHELL_REACH) ** 2), dim=0)
-
-
-def _active(features: Tensor) -> Tensor:
-    return functional.leaky_relu(features, NEGATIVE_SLOPE)

@@ -1,7 +1,8 @@
-"""Places of neighbours in steps of the sensor's beams: what nothing of differs between sensors."""
+"""What networks share that see neighbours in steps of the sensor's beams, and shells of range."""
 
 import torch
 from torch import Tensor
+from torch.nn import functional
 
 # Nothing is measured nearer than this, metres, nor right above the sensor; both keep every
 # division finite.
@@ -19,6 +20,19 @@ FARTHEST_IN_STEPS = 10.0
 
 # How many numbers describe where a neighbour is.
 NEIGHBOUR_NUMBERS = 4
+
+# Slope of every activation below 0.
+NEGATIVE_SLOPE = 0.1
+
+# Shells around the sensor in which what a scan holds is averaged: logarithms of their ranges over
+# 10 m, which are 1.7 to 90 m, and how far each reaches into the next.
+SHELLS = (-1.8, 2.2, 9)
+SHELL_REACH = 0.35
+
+
+def active(features: Tensor) -> Tensor:
+    """Features after their activation."""
+    return functional.leaky_relu(features, NEGATIVE_SLOPE)
 
 
 def asinh(steps: Tensor) -> Tensor:

@@ -6,16 +6,14 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from derain.models.layers.steps import NEIGHBOUR_NUMBERS, USUAL_RANGE
+from derain.models.layers.steps import (
+    NEIGHBOUR_NUMBERS,
+    SHELL_REACH,
+    SHELLS,
+    USUAL_RANGE,
+    active,
+)
 from derain.models.relative_outdet.steps import EPSILON, in_steps
-
-# Slope of every activation below 0.
-NEGATIVE_SLOPE = 0.1
-
-# Shells around the sensor in which what a scan holds is averaged: logarithms of their ranges over
-# 10 m, which are 1.7 to 90 m, and how far each reaches into the next.
-SHELLS = (-1.8, 2.2, 9)
-SHELL_REACH = 0.35
 
 # The vehicle or mast that carries a sensor is seen within OF_CARRIER metres, often in a few
 # scattered points that look like drops. Real drops do not end there: from there to BEYOND_CARRIER
@@ -101,18 +99,18 @@ class RelativeOutDetNetwork(nn.Module):
             logarithms of the points' ranges over the usual one, float (M,).
         """
         seen, far = in_steps(points, distances, neighbours)
-        around = _active(self.neighbour(seen)).flatten(1)
-        features = _active(_of_both(self.neighbourhood, around, far[:, None]))
+        around = active(self.neighbour(seen)).flatten(1)
+        features = active(_of_both(self.neighbourhood, around, far[:, None]))
         if self.has_context:
             features = features + self._context(features, far)
-        heard = functional.embedding(neighbours, _active(self.to_opinion(features))).flatten(1)
-        features = features + _active(_of_both(self.opinions, heard, features))
+        heard = functional.embedding(neighbours, active(self.to_opinion(features))).flatten(1)
+        features = features + active(_of_both(self.opinions, heard, features))
         return self.head(features)[:, 0], far
 
     def _context(self, features: Tensor, far: Tensor) -> Tensor:
         """What the scan holds at the range of each point, and in all."""
         share = torch.softmax(-(((far[:, None] - self.centres) / SHELL_REACH) ** 2), dim=1)
-        context = _active(self.to_context(features))
+        context = active(self.to_context(features))
         # In float64, for sums of float32 over a whole scan differ from one runtime to another, and
         # with them the logits in their third digit.
         shares, context_double = share.double(), context.double()
@@ -122,10 +120,6 @@ class RelativeOutDetNetwork(nn.Module):
         of_all = of_all.expand(context.shape[0], -1)
         result: Tensor = self.from_context(torch.cat([share @ of_shell, of_all], dim=1))
         return result
-
-
-def _active(features: Tensor) -> Tensor:
-    return functional.leaky_relu(features, NEGATIVE_SLOPE)
 
 
 def _of_both(layer: nn.Linear, first: Tensor, second: Tensor) -> Tensor:

@@ -16,17 +16,7 @@ from derain.recordings.known_points import ScanPoints
 from derain.recordings.rays import RayEvidence, ray_evidence
 from derain.scan import Scan
 
-# A quarter of a degree, as far as the rays of many sensors lie apart.
-STEP = np.radians(0.25)
-
-
-def wall(distance: float, rows: int = 24, columns: int = 40) -> NDArray[np.float64]:
-    """Points of a wall across x, seen by evenly spaced rays, (rows * columns, 3)."""
-    inclination, azimuth = np.meshgrid(
-        (np.arange(rows) - rows / 2 + 0.5) * STEP, (np.arange(columns) - columns / 2) * STEP
-    )
-    y, z = np.tan(azimuth.ravel()), np.tan(inclination.ravel()) / np.cos(azimuth.ravel())
-    return distance * np.stack([np.ones_like(y), y, z], axis=1)
+from .test_rays import STEP, wall
 
 
 def points_of(xyz: NDArray[np.float64]) -> ScanPoints:
