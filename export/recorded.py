@@ -1,6 +1,6 @@
 """A model over a recording: what it makes of each scan, and the rays of the scans around it."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.export.runtime import Derainer
-from derain.recordings.placing import PlacedFrames
+from derain.recordings.placing import PlacedFrames, are_placed
 from derain.recordings.rays import RayEvidence, Rays, mean_evidence, ray_evidence
 from derain.scan import Scan
 from derain.sources.frame import Frame
@@ -74,6 +74,14 @@ class RecordedDerainer(Method):
     def window(self) -> Window:
         """The scans before and after the one that it judges."""
         return self._window
+
+    def depends_on(self, recording: Sequence[Frame]) -> Window | None:
+        """Its window where all poses are known, else all scans, from which they are found."""
+        return self.window if are_placed(recording) else None
+
+    def fingerprint(self) -> str:
+        """A fingerprint of the model, and of how many scans around one it sees."""
+        return f"{self.model.fingerprint()}-{self.window.before}-{self.window.after}"
 
     @property
     def waiting(self) -> int:

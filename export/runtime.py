@@ -1,8 +1,9 @@
 """Runs an exported model on a CPU: NumPy, one runtime and the kNN library, nothing else."""
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, Self
 
@@ -166,6 +167,15 @@ class Derainer(Method):
     def window(self) -> Window:
         """How many scans before and after the one that it judges its view asks for."""
         return self.view.window
+
+    def depends_on(self, recording: Sequence[Frame]) -> Window:
+        """As many scans before and after the one that it judges as its view asks for."""
+        return self.window
+
+    def fingerprint(self) -> str:
+        """A fingerprint of its file, its threshold and its runtime, wherever the file is."""
+        settings = f"{self.spec.threshold} {self.runtime.name} {self.runtime.precision}"
+        return sha256(self.path.read_bytes() + settings.encode()).hexdigest()[:16]
 
     @property
     def waiting(self) -> int:

@@ -36,6 +36,7 @@ Rain means rain or snow, here and in all output.
 # chosen; those of TRAINING are Lightning's own, which parses their arguments itself.
 SUMMARIES = {
     "run": "clean scans on a CPU, without torch",
+    "status": "how far a run over many recordings is",
     "view": "look at a scan, or a recording, as several methods clean it",
     "info": "describe a scan, a label file, a model or a data set",
     "bench": "compare methods on labelled scans: error, time and memory",

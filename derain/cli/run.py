@@ -63,6 +63,7 @@ from derain.cli.options import (
 )
 from derain.cli.outputs import exit_code, noting_progress, print_error, print_facts, print_lines
 from derain.cli.parser import Parser
+from derain.cli.unit_options import add_units, division_of, executor_of, threads_of_each
 from derain.cli.weather_options import (
     add_weather,
     warn_of_bad_weather,
@@ -73,12 +74,12 @@ from derain.default import DEFAULT, model_card
 from derain.errors import InputError
 from derain.example import Truth
 from derain.export.runtime import Derainer
+from derain.files.labels import LABEL
 from derain.sources.clean_sink import CleanSink, require_probabilities
 from derain.sources.cleaned_bags import RAIN_PROBABILITY, BagOptions
-from derain.sources.cleaning import CleanedScan, CleaningObserver, CleanReport, clean
+from derain.sources.cleaned_scan import ScanOutcome
+from derain.sources.cleaning import CleaningObserver, CleanReport, clean
 from derain.sources.folders import named_frames
-from derain.sources.frame import time_of
-from derain.sources.judgement import Judgement
 from derain.sources.method import Method
 from derain.sources.recordings import irregularities
 from derain.system.memory import keep_freed_memory
@@ -95,6 +96,7 @@ RARE = (
     *("--runtime", "--precision", "--parameters", "--columns", "--intensity-scale"),
     *("--probability", "--most-removed", "--past", "--delay", "--topic", "--cleaned-topic"),
     *("--removed-topic", "--keep-shape", "--dry", "--warning", "--error", "--hold"),
+    *("--resume", "--anew", "--shard", "--dask", "--block"),
 )
 
 # The network that sees them unasked.
@@ -145,6 +147,7 @@ def add_arguments(parser: Parser) -> None:
         help="bags: keep rows and columns of organised clouds; removed points become NaN",
     )
     add_weather(parser)
+    add_units(parser)
     parser.use_rarely(*RARE)
 
 
@@ -152,6 +155,7 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     keep_freed_memory()
     name, scans = method_and_scans(arguments.method, arguments.scans or [])
+    arguments.threads = threads_of_each(arguments)
     method = method_of(name, arguments)
     frames = named_frames(within(scans, arguments.topic), arguments.columns)
     source = placed(frames, arguments.poses, arguments.threads).map(
@@ -170,8 +174,13 @@ def main(arguments: argparse.Namespace) -> int:
         probability=arguments.probability,
         bags=BagOptions(arguments.cleaned_topic, arguments.removed_topic, arguments.keep_shape),
     )
-    with sink, weather_table(arguments.weather) as rows, noting_progress(sink.so_far):
-        printer = _Printer(rows, arguments.json)
+    with (
+        sink,
+        weather_table(arguments.weather) as rows,
+        noting_progress(sink.so_far),
+        executor_of(arguments) as executor,
+    ):
+        printer = _Printer(arguments.out, rows, arguments.json)
         if name == DEFAULT:
             printer.introduce_default()
         for sentence in irregularities(source, needed):
@@ -183,10 +192,13 @@ def main(arguments: argparse.Namespace) -> int:
             most_removed=arguments.most_removed,
             weather=weather,
             observer=printer,
+            division=division_of(arguments),
+            executor=executor,
         )
         printer.summarise(report)
-    failed = exit_code(len(report.failures), len(source), "{scans} could not be cleaned")
-    return failed or warn_of_bad_weather(report.weather, arguments.fail_at)
+    total = len(report.scans) + report.not_cleaned
+    code = exit_code(report.not_cleaned, total, "{scans} could not be cleaned")
+    return code or warn_of_bad_weather(report.weather, arguments.fail_at)
 
 
 def _over_recording(method: Method, arguments: argparse.Namespace, scans: int) -> Method:
@@ -215,7 +227,8 @@ def _over_recording(method: Method, arguments: argparse.Namespace, scans: int) -
 class _Printer(CleaningObserver):
     """Prints what is done to the scans, and makes a row of a table of the weather of each."""
 
-    def __init__(self, rows: list[Sequence[object]], as_json: bool) -> None:
+    def __init__(self, out: Path, rows: list[Sequence[object]], as_json: bool) -> None:
+        self._out = out
         self._notices = Notices()
         self._rows = rows
         self._as_json = as_json
@@ -240,19 +253,22 @@ class _Printer(CleaningObserver):
                 f"{self._example} Look at it: derain view example --out figure.png", self._stream
             )
 
-    def judged(self, judgement: Judgement, odd: list[ScanIssue]) -> None:
+    def noticed(self, scan: str, odd: list[ScanIssue]) -> None:
         """Warns of what is odd about a scan."""
-        assert judgement.frame is not None
-        self._notices.warn(judgement.frame.name, odd)
+        self._notices.warn(scan, odd)
 
-    def cleaned(self, judgement: Judgement, scan: CleanedScan) -> None:
-        """Prints a line, and adds a row to the table."""
-        assert judgement.frame is not None
-        if scan.weather is not None:
-            row = weather_row(scan.weather, judgement.weather)
-            self._rows.append([scan.scan, time_of(judgement.frame), *row])
-        print_facts(asdict(scan), str(scan), self._as_json)
-        self._example.add(judgement.frame.name, judgement.rain)
+    def cleaned(self, outcome: ScanOutcome) -> None:
+        """Adds a row to the table, and prints a line."""
+        self.found(outcome)
+        print_facts(asdict(outcome.figures), str(outcome.figures), self._as_json)
+        self._example.add(outcome.frame.name, self._out / f"{outcome.frame.key}{LABEL}")
+
+    def found(self, outcome: ScanOutcome) -> None:
+        """Adds a row to the table."""
+        scan = outcome.figures
+        if scan.weather is not None and outcome.measured is not None:
+            row = weather_row(scan.weather, outcome.measured)
+            self._rows.append([scan.scan, outcome.seconds, *row])
 
     def failed(self, error: InputError) -> None:
         """Prints why a scan is not cleaned."""

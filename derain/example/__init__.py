@@ -8,9 +8,6 @@ from importlib import resources
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from derain.cards.card import load_card
 from derain.files import read_scan
 from derain.files.labels import read_labels, semantic
@@ -77,17 +74,18 @@ class Truth:
     found: int = 0
     others: int = 0
 
-    def add(self, scan: str, called: NDArray[np.bool_]) -> None:
+    def add(self, scan: str, found: Path) -> None:
         """Counts the points of a scan, if it is of the example.
 
         Args:
             scan: Its file.
-            called: Which of its points were called rain, bool (N,).
+            found: The file of the labels that a method gave it, 1 for rain.
         """
         weathers: tuple[Literal["rain", "snow"], ...] = ("rain", "snow")
         for weather in weathers:
             if scan == str(example_file(weather)):
                 is_rain = load_card("simulated").rain_of(example_scan(weather))
+                called = read_labels(found, len(is_rain)).astype(bool)
                 self.rain += int(is_rain.sum())
                 self.found += int((called & is_rain).sum())
                 self.others += int((called & ~is_rain).sum())

@@ -82,6 +82,17 @@ def file_size(path: Path) -> int:
     return status.st_size
 
 
+def stamp_of(path: Path) -> str:
+    """Size in bytes and time of change in nanoseconds of a file, which change when it does.
+
+    Raises:
+        InputError: There is no such file.
+    """
+    with reading(path):
+        status = path.stat()
+    return f"{status.st_size}-{status.st_mtime_ns}"
+
+
 def is_file(path: Path) -> bool:
     """Whether there is such a file.
 

@@ -1,6 +1,6 @@
 """A filter, ready to judge scans as an exported model does."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -102,6 +102,10 @@ class FilterDerainer(Method):
     def window(self) -> Window:
         """No scans but the one that it judges."""
         return Window()
+
+    def depends_on(self, recording: Sequence[Frame]) -> Window:
+        """No scans but the one that it judges."""
+        return self.window
 
     @property
     def waiting(self) -> int:

@@ -1,7 +1,7 @@
 """Rain by free space: what rays of the scans before and after went through was not there."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, Self
 from weakref import WeakKeyDictionary
@@ -13,7 +13,7 @@ from derain.errors import InputError
 from derain.files.documents import shown
 from derain.recordings.evidence import combined_log_odds, vote
 from derain.recordings.known_points import ScanPoints
-from derain.recordings.placing import PlacedFrames
+from derain.recordings.placing import PlacedFrames, are_placed
 from derain.recordings.rays import RayEvidence, mean_evidence
 from derain.recordings.recording_method import RecordingMethod
 from derain.recordings.registry import METHODS
@@ -114,6 +114,10 @@ class PersistenceDerainer(RecordingMethod):
     def window(self) -> Window:
         """The scans before and after the one that it judges."""
         return Window(self.persistence.before, self.persistence.after)
+
+    def depends_on(self, recording: Sequence[Frame]) -> Window | None:
+        """Its window where all poses are known, else all scans, from which they are found."""
+        return self.window if are_placed(recording) else None
 
     @property
     def waiting(self) -> int:

@@ -1,6 +1,6 @@
 """The last frames of a recording, each where it was taken: by its pose, or else by odometry."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -87,3 +87,11 @@ class PlacedFrames(RecentFrames):
             pose = registration.pose
         self._doubts[scan] = doubts
         return PlacedScan(scan, None, pose, self._stretch)
+
+
+def are_placed(recording: Sequence[Frame]) -> bool:
+    """Whether all frames of a recording have poses, so that none is found from its scans."""
+    try:
+        return all(frame.pose is not None for frame in recording)
+    except InputError:  # a damaged record: see PlacedFrames
+        return False

@@ -11,6 +11,7 @@ from derain.bags.names import split, stem
 from derain.bags.point_cloud import scan_of_cloud
 from derain.errors import InputError
 from derain.files.labels import LABEL
+from derain.files.reading import file_size, reading, stamp_of
 from derain.scan import Scan
 from derain.sources.file_frame import FileFrame
 
@@ -64,6 +65,20 @@ class BagFrame(FileFrame):
     def fingerprint(self) -> str:
         """First 16 hexadecimal digits of the SHA-256 of its message."""
         return self._checksum()[:16]
+
+    def size(self) -> int:
+        """Bytes of its share of the bag."""
+        with reading(self.clouds.bag.path):
+            return sum(map(file_size, self._files())) // max(len(self.clouds), 1)
+
+    def stamp(self) -> str:
+        """Size and time of change of the files of its bag, and its place in it."""
+        return " ".join([*map(stamp_of, self._files()), self.clouds.topic.name, str(self.number)])
+
+    def _files(self) -> list[Path]:
+        """The files of its bag."""
+        bag = self.clouds.bag.path
+        return sorted(filter(Path.is_file, bag.iterdir())) if bag.is_dir() else [bag]
 
     def _checksum(self) -> str:
         return sha256(self.clouds.message(self.number).data).hexdigest()

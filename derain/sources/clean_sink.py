@@ -1,6 +1,8 @@
 """Scans without their rain: files in a folder, and whole bags written anew."""
 
 from collections.abc import Iterator
+from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Self
 
@@ -39,6 +41,11 @@ class CleanSink:
     Raises:
         InputError: The folder holds files that must not be overwritten, two scans have one name, or
             options that contradict each other.
+
+    Attributes:
+        folder: Folder to write to.
+        for_scans: Makes a sink with the same folder and options for another source.
+        options: What is written, true or false or a name each.
     """
 
     def __init__(
@@ -50,12 +57,18 @@ class CleanSink:
         probability: bool = False,
         bags: BagOptions = BagOptions(),
     ) -> None:
+        self.folder = Path(folder)
         self.probability = probability
-        self._source = source
         removed = None if removed is None else Path(removed)
-        self._files = FolderSink(Path(folder), again=False, removed=removed)
+        # The same for other scans, also in another process.
+        self.for_scans = partial(
+            CleanSink, self.folder, removed=removed, probability=probability, bags=bags
+        )
+        self.options = {"removed": removed is not None, "probability": probability, **asdict(bags)}
+        self._source = source
+        self._files = FolderSink(self.folder, again=False, removed=removed)
         self._files.refuse_clashes(source)
-        self._bags = CleanedBags(Path(folder), source, bags, probability)
+        self._bags = CleanedBags(self.folder, source, bags, probability)
         in_bag = next(filter(self._bags.takes, source), None)
         if removed is not None and in_bag is not None:
             raise InputError(
@@ -75,7 +88,8 @@ class CleanSink:
     def targets(self) -> Iterator[Path]:
         """Every file and bag that it may write."""
         for frame in self._source:
-            yield from self._files.files_of(frame)
+            if not self._bags.takes(frame):
+                yield from self._files.files_of(frame)
         yield from self._bags.targets()
 
     def write(self, judgement: Judgement) -> None:

@@ -1,72 +1,27 @@
 """Cleans the scans of a source, and reports what was done."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
 from tqdm import tqdm
 
-from derain.errors import InputError, printable
+import derain
+from derain.errors import InputError
+from derain.jobs.job import Job
+from derain.jobs.running import Submits, Task, UnitResult, run
 from derain.sources.clean_sink import CleanSink
+from derain.sources.cleaned_scan import CleanedScan, ScanOutcome, counts
+from derain.sources.file_frame import FileFrame
 from derain.sources.folders import GivenScans, source_of
-from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
-from derain.sources.judging import Failures, judgements
 from derain.sources.method import Method
+from derain.sources.source import Source
+from derain.sources.unit_cleaning import UnitCleaning
+from derain.sources.units import Division, FrameUnit, units_of, whole
 from derain.sources.weather_monitor import WeatherMonitor, WeatherOptions
-from derain.system.stopwatch import Stopwatch
-from derain.views.scan_issues import (
-    HEAVIEST_RAIN,
-    MOST_RAIN,
-    ScanIssue,
-    left_out,
-    much_removed,
-    no_points,
-)
-from derain.weather.record import WeatherRecord
-
-
-@dataclass(frozen=True)
-class CleanedScan:
-    """What was done to one scan.
-
-    Attributes:
-        scan: Its file.
-        points: Number of points.
-        valid: Number of points that can be judged.
-        rain: Number of removed points.
-        share_removed: Share of ``rain`` in ``valid``.
-        not_known: Number of valid points of which the method is not sure; None for a method that
-            does not report doubt.
-        milliseconds: Time of each stage.
-        warnings: What is odd about the scan.
-        weather: Its weather; None unless every scan is measured.
-    """
-
-    scan: str
-    points: int
-    valid: int
-    rain: int
-    share_removed: float
-    not_known: int | None
-    milliseconds: dict[str, float]
-    warnings: list[str]
-    weather: WeatherRecord | None
-
-    def __str__(self) -> str:
-        name, total = printable(self.scan), sum(self.milliseconds.values())
-        unsure = "" if self.not_known is None else f", {self.share_not_known:.1%} not known"
-        weather = "" if self.weather is None else f", {self.weather}"
-        return (
-            f"{name}: {_counts(self.points, self.valid, self.rain)}{unsure}{weather}, "
-            f"{total:.0f} ms"
-        )
-
-    @property
-    def share_not_known(self) -> float:
-        """Share of ``not_known`` in ``valid``."""
-        return (self.not_known or 0) / max(self.valid, 1)
+from derain.views.scan_issues import MOST_RAIN, ScanIssue
 
 
 @dataclass(frozen=True)
@@ -82,19 +37,24 @@ class CleanReport:
         scans: The cleaned scans, in order.
         failures: Why other scans were not cleaned.
         weather: The weather of all scans together.
+        before: Number of the cleaned scans that an earlier run had cleaned.
+        not_cleaned: Number of scans that were not cleaned.
     """
 
     scans: list[CleanedScan]
     failures: list[InputError]
     weather: WeatherMonitor
+    before: int
+    not_cleaned: int
 
     def __str__(self) -> str:
         points, valid, rain = (
             sum(getattr(scan, name) for scan in self.scans) for name in ("points", "valid", "rain")
         )
         odd = sum(bool(scan.warnings) for scan in self.scans)
+        before = f" ({self.before:,} of them done before)" if self.before else ""
         return (
-            f"{len(self.scans):,} scans: {_counts(points, valid, rain)}, {self.weather}; "
+            f"{len(self.scans):,} scans{before}: {counts(points, valid, rain)}, {self.weather}; "
             f"{odd:,} scans with warnings"
         )
 
@@ -102,11 +62,17 @@ class CleanReport:
 class CleaningObserver:
     """Follows a cleaning while it runs. A subclass prints or records; this one does nothing."""
 
-    def judged(self, judgement: Judgement, odd: list[ScanIssue]) -> None:
-        """Called for each judged scan, before it is written, with what is odd about it."""
+    def judged(self, judgement: Judgement) -> None:
+        """Called for each judged scan before it is written, where no records are kept."""
 
-    def cleaned(self, judgement: Judgement, scan: CleanedScan) -> None:
+    def noticed(self, scan: str, odd: list[ScanIssue]) -> None:
+        """Called for each judged scan with what is odd about it."""
+
+    def cleaned(self, outcome: ScanOutcome) -> None:
         """Called for each scan that is written."""
+
+    def found(self, outcome: ScanOutcome) -> None:
+        """Called for each scan that an earlier run has written."""
 
     def failed(self, error: InputError) -> None:
         """Called for each scan that could not be cleaned."""
@@ -120,6 +86,8 @@ def clean(
     most_removed: float = MOST_RAIN,
     weather: WeatherOptions = WeatherOptions(),
     observer: CleaningObserver = CleaningObserver(),
+    division: Division | None = None,
+    executor: Submits | None = None,
 ) -> CleanReport:
     """Writes scans without their rain, and their labels (1 = rain).
 
@@ -137,75 +105,86 @@ def clean(
         most_removed: Scans with a greater share of rain in their valid points are not written.
         weather: How the weather is measured.
         observer: Follows the cleaning.
+        division: How the scans are divided into units. Where there are more scans than a block has,
+            a record of each unit is kept in the folder, by which a run that was stopped goes on.
+            None keeps no records, unless there is an executor.
+        executor: Does the units: an executor of :mod:`concurrent.futures` or the like, whose
+            processes find all files by the same paths. None does them in this process.
 
     Returns:
         What was done to each scan, and to all of them.
 
     Raises:
         InputError: No scans, a folder whose files would be overwritten, or a bag that cannot be
-            written.
+            written; records of other options in the folder; an executor that has ended.
     """
     source = source_of(source)
-    monitor, failures = WeatherMonitor(weather, source), Failures(observer.failed)
-    scans: list[CleanedScan] = []
+    monitor = WeatherMonitor(weather, source)
+    measured = None if weather.every_scan else monitor.sample
+    cleaned: list[CleanedScan] = []
+    failures: list[InputError] = []
+    before = 0
     with nullcontext(sink) if isinstance(sink, CleanSink) else CleanSink(sink, source) as opened:
-        frames = tqdm(source, unit="scan", disable=None)
-        for frame, judgement, stopwatch in judgements(method, frames, failures.skipping_failures):
-            with failures.skipping_failures(frame):
-                odd = _issues(method, judgement, most_removed)
-                observer.judged(judgement, odd)
-                _refuse_too_much_rain(frame, judgement.share_of_rain, most_removed)
-                with stopwatch.stage("weather"):
-                    measured = judgement.weather if monitor.is_due(frame) else None
-                with stopwatch.stage("write"):
-                    opened.write(judgement)
-                record = None if measured is None else monitor.add(frame, measured)
-                cleaned = _cleaned(frame, judgement, stopwatch, odd, record)
-                observer.cleaned(judgement, cleaned)
-                scans.append(cleaned)
-    return CleanReport(scans, failures.errors, monitor)
+        work = UnitCleaning(method, opened.for_scans, most_removed, measured, method.fingerprint())
+        division = Division(resume=True) if division is None and executor is not None else division
+        if division is not None and _keeps_records(source, division, opened.folder):
+            job = _job(source, work, opened, division)
+            units = units_of(source, method, division.block)
+            job.list_units(units)
+            units = units if division.shard is None else division.shard.of(units)
+            outcomes = run(Task(job, work), units, executor)
+        else:
+            units = [whole(source)]
+            outcomes = _at_once(units[0], work, opened, observer)
+        scans = sum(len(unit.frames) for unit in units)
+        for result in tqdm(outcomes, total=scans, unit="scan", disable=None):
+            outcome = result.result
+            observer.noticed(outcome.frame.name, outcome.issues)
+            if outcome.error is not None:
+                failures.append(outcome.error)
+                observer.failed(outcome.error)
+                continue
+            if outcome.measured is not None:
+                record = monitor.add(outcome.frame, outcome.measured)
+                outcome = outcome.with_weather(record)
+            if result.before:
+                observer.found(outcome)
+            else:
+                observer.cleaned(outcome)
+            before += result.before
+            cleaned.append(outcome.figures)
+    return CleanReport(cleaned, failures, monitor, before, scans - len(cleaned))
 
 
-def _issues(method: Method, judgement: Judgement, most_removed: float) -> list[ScanIssue]:
-    scan, share = judgement.scan, judgement.share_of_rain
-    odd = [*method.issues(judgement), *left_out(scan), *no_points(scan)]
-    return odd if share > most_removed else [*odd, *much_removed(share)]
+def _at_once(
+    unit: FrameUnit, work: UnitCleaning, sink: CleanSink, observer: CleaningObserver
+) -> Iterator[UnitResult[FrameUnit, ScanOutcome]]:
+    """Cleans scan after scan, without records."""
+    for outcome in work.clean(unit, sink, observer.judged):
+        yield UnitResult(unit, outcome, before=False)
 
 
-def _refuse_too_much_rain(frame: Frame, share: float, most_removed: float) -> None:
-    if share > most_removed:
-        raise InputError(
-            frame.name,
-            f"left whole, for {share:.1%} of its valid points are called rain, where the "
-            f"heaviest rain has {HEAVIEST_RAIN:.0%}",
-            "See whether the method suits sensor and unit of intensity, or raise --most-removed.",
-        )
+def _keeps_records(source: Source, division: Division, folder: Path) -> bool:
+    """Whether there is a record of each unit: where it is asked for, or begun, or takes long."""
+    asked = division.resume or division.anew or division.shard is not None
+    return asked or len(source) > division.block or Job.is_begun(folder)
 
 
-def _cleaned(
-    frame: Frame,
-    judgement: Judgement,
-    stopwatch: Stopwatch,
-    odd: Sequence[ScanIssue],
-    weather: WeatherRecord | None,
-) -> CleanedScan:
-    valid, known = judgement.scan.valid, judgement.known
-    return CleanedScan(
-        scan=frame.name,
-        points=len(valid),
-        valid=int(valid.sum()),
-        rain=int(judgement.rain.sum()),
-        share_removed=judgement.share_of_rain,
-        not_known=None if known is None else int((valid & ~judgement.answered).sum()),
-        milliseconds=dict(stopwatch.milliseconds),
-        warnings=[issue.detail for issue in odd],
-        weather=weather,
-    )
-
-
-def _counts(points: int, valid: int, rain: int) -> str:
-    """The number of points, of those that can be judged, and of those that are rain."""
-    return (
-        f"{points:,} points, {valid:,} valid, {rain:,} of rain ({rain / max(valid, 1):.1%} of the "
-        "valid)"
-    )
+def _job(source: Source, work: UnitCleaning, sink: CleanSink, division: Division) -> Job:
+    """Begins a job, or goes on with the one of the folder, by all that the results depend on."""
+    parameters = work.method.as_dict()
+    files = [frame for frame in source if isinstance(frame, FileFrame)]
+    options = {
+        "command": "run",
+        "derain": derain.__version__,
+        **parameters,
+        "method": Path(parameters["method"]).name,
+        "fingerprint": work.fingerprint,
+        **sink.options,
+        "most_removed": work.most_removed,
+        "weather": "every scan" if work.measured is None else "some scans",
+        "block": division.block,
+        "columns": sorted({",".join(frame.columns) for frame in files}),
+        "intensity_scale": sorted({frame.intensity_scale for frame in source}),
+    }
+    return Job.begin(sink.folder, options, division.shard, division.anew)

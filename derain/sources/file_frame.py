@@ -11,7 +11,7 @@ from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS, count_points, read_scan
 from derain.files.labels import read_labels, semantic
 from derain.files.names import scan_stem
-from derain.files.reading import file_size, read_bytes, reading
+from derain.files.reading import file_size, read_bytes, reading, stamp_of
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.records import Records
@@ -88,6 +88,16 @@ class FileFrame(Frame):
     def checksums(self) -> tuple[str, str | None]:
         """SHA-256 of its file and of that of its labels, in hexadecimal digits."""
         return self._checksum(), _sha256(self.label_path) if self.label_path else None
+
+    def size(self) -> int:
+        """Bytes of its file."""
+        with reading(self.path):
+            return file_size(self.path)
+
+    def stamp(self) -> str:
+        """Size and time of change of its file, and of the records beside it."""
+        of_records = "" if self.records is None else self.records.stamp
+        return f"{stamp_of(self.path)} {of_records}"
 
     def _checksum(self) -> str:
         return _sha256(self.path)

@@ -137,6 +137,22 @@ class Frame(ABC):
             InputError: A file that cannot be read.
         """
 
+    @abstractmethod
+    def size(self) -> int:
+        """Bytes of what is read of it.
+
+        Raises:
+            InputError: A file that is not there.
+        """
+
+    @abstractmethod
+    def stamp(self) -> str:
+        """What changes when the scan does, or a record of its time and pose, without reading it.
+
+        Raises:
+            InputError: A file that is not there.
+        """
+
     def follows(self, other: "Frame") -> bool:
         """Whether it is the next of the same recording, with none between."""
         return self.sequence == other.sequence and self.number == other.number + 1
@@ -224,6 +240,14 @@ class MemoryFrame(Frame):
         label = self.scan.label if self.has_labels else None
         of_label = None if label is None else sha256(label.astype("<i8").tobytes()).hexdigest()
         return sha256(points).hexdigest(), of_label
+
+    def size(self) -> int:
+        """Bytes of its coordinates."""
+        return self.scan.xyz.nbytes
+
+    def stamp(self) -> str:
+        """A fingerprint of its points."""
+        return self.fingerprint()
 
     def without_labels(self) -> Self:
         """The same frame without its labels."""

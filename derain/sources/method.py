@@ -1,10 +1,12 @@
 """What every method does that judges the frames of a recording."""
 
+import json
 import sys
 import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property
+from hashlib import sha256
 from typing import Any, ClassVar
 
 from numpy.typing import NDArray
@@ -130,6 +132,24 @@ class Method(ABC):
     def _warned_of(self) -> set[str]:
         """Kinds of faults."""
         return set()
+
+    def depends_on(self, recording: Sequence[Frame]) -> Window | None:
+        """How far its answer for one scan of a recording depends on the scans around it.
+
+        Args:
+            recording: Frames of which each follows the one before it.
+
+        Returns:
+            Numbers of scans before and after; None where it may depend on all of them, as here.
+        """
+        return None
+
+    def fingerprint(self) -> str:
+        """A fingerprint of what it calls rain: of its parameters, and of its weights if it has any.
+
+        It is 16 hexadecimal digits.
+        """
+        return sha256(json.dumps(self.as_dict(), sort_keys=True).encode()).hexdigest()[:16]
 
     @abstractmethod
     def as_dict(self) -> dict[str, Any]:

@@ -4,7 +4,8 @@
 - ``poses.txt``: a line a scan, or poses by time; see :mod:`derain.sources.trajectory`.
 """
 
-from functools import cached_property
+from collections.abc import Callable
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from derain.errors import InputError
 from derain.files import find_scans
 from derain.files.frame_times import METADATA, read_frame_times
 from derain.files.names import scan_stem
-from derain.files.reading import is_file
+from derain.files.reading import is_file, stamp_of
 from derain.sources.number_lines import read_numbers
 from derain.sources.trajectory import Trajectory, read_trajectory
 
@@ -59,6 +60,15 @@ class Records:
         return pose
 
     @cached_property
+    def stamp(self) -> str:
+        """Sizes and times of change of the records that are there."""
+        places = (self._beside(TIMES), self._beside(POSES), self.folder / METADATA)
+        return " ".join(stamp_of(path) for path in places if path is not None and is_file(path))
+
+    def __reduce__(self) -> tuple[Callable[[Path], "Records"], tuple[Path]]:
+        return records_of, (self.folder,)  # what is read stays where it was read
+
+    @cached_property
     def _times(self) -> NDArray[np.float64] | None:
         """Seconds of each scan or line, float64 (T,)."""
         if path := self._beside(TIMES):
@@ -90,6 +100,12 @@ class Records:
         folder = self.folder.absolute()
         places = (folder / name, folder.parent / name)
         return next((place for place in places if is_file(place)), None)
+
+
+@lru_cache(maxsize=16)
+def records_of(folder: Path) -> Records:
+    """The records of a folder, which frames that come from another process share."""
+    return Records(folder)
 
 
 def line_of(record: Path, lines: int, scan: str, place: int | None, scans: int) -> int:

@@ -52,6 +52,7 @@ class WeatherMonitor:
         scans: Number of measured scans.
         scans_at: Number of scans at each level, by the alarm of a recording, otherwise by the scan
             alone; None stands for scans whose level is open. Empty unless every scan is measured.
+        sample: Keys of the scans to measure where not every scan is.
     """
 
     def __init__(self, options: WeatherOptions, source: Source) -> None:
@@ -62,12 +63,8 @@ class WeatherMonitor:
         self._alarm, self._recording = options.new_alarm(), -1
         self._recordings = _recording_numbers(source) if options.every_scan else {}
         sampled = 0 if options.every_scan or len(source) == 1 else SAMPLED_SCANS
-        self._sample = {frame.key for frame in evenly_spaced(source, sampled)}
+        self.sample = frozenset(frame.key for frame in evenly_spaced(source, sampled))
         self._reaches: list[float] = []
-
-    def is_due(self, frame: Frame) -> bool:
-        """Whether the weather of a scan is measured."""
-        return self._options.every_scan or frame.key in self._sample
 
     def add(self, frame: Frame, weather: ScanWeather) -> WeatherRecord | None:
         """Adds the weather of the next scan.

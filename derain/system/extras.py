@@ -85,11 +85,12 @@ APSW = Extra("ros", "apsw")
 LZ4 = Extra("ros", "lz4")
 ZSTANDARD = Extra("ros", "zstandard")
 RERUN = Extra("view", "rerun")
+DISTRIBUTED = Extra("cluster", "distributed")
 
 EXTRAS = (
     *(TORCH, LIGHTNING, TORCHMETRICS, JSONARGPARSE, TENSORBOARD, MATPLOTLIB),
     *(ONNX, ONNXSCRIPT, OPTUNA, OPEN3D, PYARROW, FLATBUFFERS, LASPY),
-    *(OPENVINO, ROSBAGS, MCAP, RERUN),
+    *(OPENVINO, ROSBAGS, MCAP, RERUN, DISTRIBUTED),
 )
 
 # What is needed to read a checkpoint, to make an ONNX file of it, and to train it.

@@ -28,7 +28,7 @@ def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     others = set(multiprocessing.active_children())
     # Not forked: a fork has the locks of this process, but not the threads that would release them.
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, context, _end_with_parent) as pool:
+    with ProcessPoolExecutor(workers, context, end_with_parent) as pool:
         try:
             yield pool
         except BaseException:
@@ -72,7 +72,8 @@ def _watch(launcher: int) -> None:
     os._exit(1)
 
 
-def _end_with_parent() -> None:
+def end_with_parent() -> None:
+    """Ends this process when the one that started it has ended, however it ended."""
     parent = multiprocessing.parent_process()
     assert parent is not None
 

@@ -20,10 +20,12 @@ from derain.export.bench.report import SHORT, main_table
 from derain.export.methods import load_method
 from derain.files import DEFAULT_COLUMNS
 from derain.files.atomic import require_writable
+from derain.files.labels import LABEL
 from derain.pictures.scan_pictures import before_after_figure, comparison_figure, save
 from derain.simulation.campaign import Campaign, partition
 from derain.simulation.dataset import simulate_track
-from derain.sources.cleaning import CleanedScan, CleaningObserver, CleanReport, clean
+from derain.sources.cleaned_scan import ScanOutcome
+from derain.sources.cleaning import CleaningObserver, CleanReport, clean
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
@@ -182,7 +184,10 @@ def _clean(config: DemoConfig, title: str, frame: Frame, steps: Steps) -> None:
     folder, model = Path(frame.name).parent, config.model(title)
     steps.begin(f"Cleaning: {folder}, by {model}")
     drawing = Drawing(
-        config.out / "before_after.png", frame.name, f"Simulated rain, cleaned by {title}"
+        config.out / "before_after.png",
+        frame.name,
+        f"Simulated rain, cleaned by {title}",
+        config.out / "cleaned",
     )
     method = load_method(str(model), {})
     report = clean(named_frames([folder]), method, config.out / "cleaned", observer=drawing)
@@ -216,33 +221,38 @@ class Drawing(CleaningObserver):
         file: The picture.
         scan: Name of the scan.
         heading: Title of the picture.
+        labels: Folder of the labels that the scans get.
 
     Attributes:
         by_range: Valid points by band of range and by whether they are removed, int64 (bands, 2).
         truth: What of the rain of the example is found.
     """
 
-    def __init__(self, file: Path, scan: str, heading: str) -> None:
+    def __init__(self, file: Path, scan: str, heading: str, labels: Path) -> None:
         self.file = file
         self.by_range = np.zeros((len(RANGE_EDGES), 2), np.int64)
         self.truth = Truth()
-        self._scan, self._heading = scan, heading
+        self._scan, self._heading, self._labels = scan, heading, labels
         self._notices = Notices()
 
-    def judged(self, judgement: Judgement, odd: list[ScanIssue]) -> None:
+    def judged(self, judgement: Judgement) -> None:
         """Draws the scan, whether it is written or left whole."""
         assert judgement.frame is not None
-        self._notices.warn(judgement.frame.name, odd)
+        self._judgement = judgement
         if judgement.frame.name == self._scan:
             save(before_after_figure(judgement.scan, judgement.rain, self._heading), self.file)
 
-    def cleaned(self, judgement: Judgement, scan: CleanedScan) -> None:
+    def noticed(self, scan: str, odd: list[ScanIssue]) -> None:
+        """Warns of what is odd about a scan."""
+        self._notices.warn(scan, odd)
+
+    def cleaned(self, outcome: ScanOutcome) -> None:
         """Counts a scan that is written."""
+        judgement = self._judgement
         valid = judgement.scan.valid
         band, removed = band_of(judgement.scan.range[valid]), judgement.rain[valid]
         self.by_range += table_of((band, removed.astype(np.int64)), self.by_range.shape)
-        assert judgement.frame is not None
-        self.truth.add(judgement.frame.name, judgement.rain)
+        self.truth.add(outcome.frame.name, self._labels / f"{outcome.frame.key}{LABEL}")
 
     def failed(self, error: InputError) -> None:
         """Warns of a scan that is left whole or cannot be read."""
@@ -274,7 +284,7 @@ def clean_given_scans(scans: Path, columns: Sequence[str], out: Path, steps: Ste
     steps.begin(f"Cleaning: {scans}, by the model that comes with derain")
     source = named_frames([scans], columns)
     heading = f"{source[0].key}, cleaned by the model that comes with derain"
-    drawing = Drawing(out / "before_after.png", source[0].name, heading)
+    drawing = Drawing(out / "before_after.png", source[0].name, heading, out)
     report = clean(source, load_method(DEFAULT, {}), out, observer=drawing)
     steps.end(f"{report}; before and after: {drawing.file}")
     steps.show(f"        removed by range: {drawing.shares}")

@@ -8,10 +8,10 @@ import pytest
 import derain
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import read_labels
-from derain.sources.cleaning import CleanedScan, CleaningObserver
+from derain.sources.cleaned_scan import ScanOutcome
+from derain.sources.cleaning import CleaningObserver
 from derain.sources.judgement import Judgement
 from derain.sources.weather_monitor import WeatherOptions
-from derain.views.scan_issues import ScanIssue
 
 DROR = derain.FilterDerainer(derain.DROR())
 
@@ -22,11 +22,11 @@ class Recorder(CleaningObserver):
     def __init__(self) -> None:
         self.calls: list[tuple[str, str]] = []
 
-    def judged(self, judgement: Judgement, odd: list[ScanIssue]) -> None:
+    def judged(self, judgement: Judgement) -> None:
         self.calls.append(("judged", Path(judgement.scan.name).name))
 
-    def cleaned(self, judgement: Judgement, scan: CleanedScan) -> None:
-        self.calls.append(("cleaned", Path(scan.scan).name))
+    def cleaned(self, outcome: ScanOutcome) -> None:
+        self.calls.append(("cleaned", Path(outcome.frame.name).name))
 
     def failed(self, error: derain.InputError) -> None:
         self.calls.append(("failed", Path(str(error.subject)).name))

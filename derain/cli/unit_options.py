@@ -1,0 +1,101 @@
+"""Options of commands that divide their work into units: processes, machines, and records."""
+
+import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from derain.cli.options import count
+from derain.errors import InputError
+from derain.jobs.running import Submits
+from derain.jobs.shard import Shard
+from derain.jobs.workers import WorkerPool
+from derain.sources.units import BLOCK, Division
+from derain.system.cores import threads_of
+
+
+def add_units(parser: argparse.ArgumentParser) -> None:
+    """Declares the options."""
+    group = parser.add_argument_group("many scans")
+    group.add_argument(
+        "--workers", type=count, metavar="N", help="processes, which share the threads (default: 1)"
+    )
+    group.add_argument(
+        "--dask",
+        metavar="ADDRESS",
+        help="workers of a Dask cluster: address of its scheduler, or the scheduler's file",
+    )
+    group.add_argument(
+        "--shard",
+        type=shard,
+        metavar="I/N",
+        help="do share I of N, from 0 on (default: by SLURM_ARRAY_TASK_ID, where there is one)",
+    )
+    group.add_argument(
+        "--resume",
+        action="store_true",
+        help="go on where an earlier run was stopped (default where --out has records of it, which "
+        f"runs of more than {BLOCK} scans keep)",
+    )
+    group.add_argument(
+        "--anew", action="store_true", help="do everything again, also with other options"
+    )
+    group.add_argument(
+        "--block",
+        type=count,
+        default=BLOCK,
+        metavar="SCANS",
+        help="scans of a unit of a long recording (default: %(default)s)",
+    )
+
+
+def shard(text: str) -> Shard:
+    """A share of the units."""
+    try:
+        return Shard.of_text(text)
+    except InputError as error:
+        raise argparse.ArgumentTypeError(f"{error.reason}") from error
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def division_of(arguments: argparse.Namespace) -> Division:
+    """How the arguments divide the work.
+
+    Raises:
+        InputError: Options that exclude each other.
+    """
+    of_shard = arguments.shard or Shard.of_environment()
+    if arguments.anew and of_shard is not None:
+        raise InputError(
+            "--anew", "excludes shares of the work", "Give --out another folder instead."
+        )
+    resume = arguments.resume or arguments.workers is not None or arguments.dask is not None
+    return Division(arguments.block, of_shard, resume, arguments.anew)
+
+
+def threads_of_each(arguments: argparse.Namespace) -> int:
+    """Threads of each process, which share those of the command; 0 stands for every core."""
+    if arguments.dask is not None:
+        return int(arguments.threads or 1)  # a worker of Dask does a unit in each of its threads
+    return max(threads_of(arguments.threads) // (arguments.workers or 1), 1)
+
+
+@contextmanager
+def executor_of(arguments: argparse.Namespace) -> Iterator[Submits | None]:
+    """Lends the processes that the arguments name; None where this process does the work.
+
+    Raises:
+        InputError: Options that exclude each other, or a cluster that cannot do the work.
+    """
+    if arguments.dask is not None:
+        if arguments.workers is not None:
+            raise InputError("--workers", "excludes --dask", "Leave one of them out.")
+        from derain.jobs.cluster import dask_executor  # imports Dask
+
+        with dask_executor(arguments.dask) as executor:
+            yield executor
+    elif (arguments.workers or 1) > 1:
+        with WorkerPool(arguments.workers) as pool:
+            yield pool
+    else:
+        yield None

@@ -1,0 +1,254 @@
+"""Does the units of a job, here or by an executor, and passes over those that are done."""
+
+import pickle
+import platform
+import threading
+import time
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor, CancelledError
+from dataclasses import dataclass
+from typing import Any, Generic, Protocol, TypeVar, cast
+
+import derain
+from derain.errors import InputError
+from derain.jobs.job import Job
+from derain.jobs.record import Record
+from derain.jobs.unit import Unit
+
+# At most so many units are handed out and not yet reported: what they return waits in memory.
+AHEAD = 1000
+
+UnitT = TypeVar("UnitT", bound=Unit)
+ResultT = TypeVar("ResultT")
+
+
+class UnfitWorkerError(InputError):
+    """A process of an executor cannot do a job as it was begun."""
+
+
+class Submits(Protocol):
+    """An executor: any of :mod:`concurrent.futures`, of Dask, of submitit, or the like.
+
+    What ``submit`` returns needs ``result()`` and ``done()``.
+    """
+
+    def submit(self, work: Callable[..., Any], /, *given: Any) -> Any:
+        """Has work done, now or later, here or elsewhere."""
+
+
+class Work(ABC, Generic[UnitT, ResultT]):
+    """What is done of each unit. It is pickled once a job, and a process keeps the last one."""
+
+    @abstractmethod
+    def do(self, unit: UnitT) -> Iterator[ResultT]:
+        """Does a unit and yields its results; what it writes is complete when it ends.
+
+        Raises:
+            InputError: The whole unit fails.
+        """
+
+    @abstractmethod
+    def is_there(self, unit: UnitT) -> bool:
+        """Whether everything that the unit writes is there."""
+
+    @abstractmethod
+    def failed(self, unit: UnitT, error: InputError) -> Iterator[ResultT]:
+        """The results of a unit that failed as a whole."""
+
+    @abstractmethod
+    def error_of(self, result: ResultT) -> InputError | None:
+        """Why a result is none; None where it is one."""
+
+    @abstractmethod
+    def to_json(self, result: ResultT) -> Any:
+        """A result as its record has it."""
+
+    @abstractmethod
+    def from_json(self, unit: UnitT, written: Any) -> ResultT:
+        """A result from its record."""
+
+    def check(self) -> None:
+        """Refuses a process where the results would be others than where the job began.
+
+        Raises:
+            InputError: For instance because a file has another content there.
+        """
+
+
+@dataclass(frozen=True)
+class Task(Generic[UnitT, ResultT]):
+    """What a process does of the units of a job, with a record of each.
+
+    Attributes:
+        job: The job.
+        work: What is done.
+        version: The version of derain that began it.
+    """
+
+    job: Job
+    work: Work[UnitT, ResultT]
+    version: str = derain.__version__
+
+    def check(self) -> None:
+        """Refuses another version of derain, and what the work refuses."""
+        if self.version != derain.__version__:
+            raise InputError(
+                "worker",
+                f"it has derain {derain.__version__}, and this command {self.version}",
+                "Install the same version everywhere.",
+            )
+        self.work.check()
+
+    def done(self, unit: UnitT) -> list[ResultT] | None:
+        """The results of a unit by its record; None where it is to be done."""
+        record = self.job.record_of(unit)
+        if record is None or record.errors or not self.work.is_there(unit):
+            return None
+        return [self.work.from_json(unit, written) for written in record.results]
+
+    def do(self, unit: UnitT) -> Iterator[ResultT]:
+        """Does a unit and yields its results; its record is there at the end."""
+        began, results = time.perf_counter(), []
+        try:
+            for result in self.work.do(unit):
+                results.append(result)
+                yield result
+        except InputError as error:
+            failed = list(self.work.failed(unit, error))
+            results += failed
+            yield from failed
+        self._record(unit, results, time.perf_counter() - began)
+
+    def fail(self, unit: UnitT, error: InputError) -> list[ResultT]:
+        """The results of a unit that failed where its process could not record it."""
+        results = list(self.work.failed(unit, error))
+        self._record(unit, results, 0.0)
+        return results
+
+    def _record(self, unit: UnitT, results: list[ResultT], seconds: float) -> None:
+        errors = [error for each in results if (error := self.work.error_of(each)) is not None]
+        written = [self.work.to_json(each) for each in results if not self.work.error_of(each)]
+        self.job.record(Record.of(unit, self.job.fingerprint, seconds, errors, written))
+
+
+@dataclass(frozen=True)
+class UnitResult(Generic[UnitT, ResultT]):
+    """One result.
+
+    Attributes:
+        unit: The unit that it is of.
+        result: The result.
+        before: Whether an earlier command had it.
+    """
+
+    unit: UnitT
+    result: ResultT
+    before: bool
+
+
+def run(
+    task: Task[UnitT, ResultT],
+    units: Sequence[UnitT],
+    executor: Submits | None = None,
+) -> Iterator[UnitResult[UnitT, ResultT]]:
+    """Does the units of a job that are not done.
+
+    Args:
+        task: What is done of each.
+        units: The units.
+        executor: What does them; None does one after the other in this process.
+
+    Yields:
+        Each result, in the order of the units, as soon as it and all before it are known.
+
+    Raises:
+        InputError: The executor has ended, or its processes cannot do the work.
+    """
+    if executor is None:
+        for unit in units:
+            done = task.done(unit)
+            for result in task.do(unit) if done is None else done:
+                yield UnitResult(unit, result, done is not None)
+    else:
+        yield from _by(executor, task, units)
+
+
+def _by(
+    executor: Submits, task: Task[UnitT, ResultT], units: Sequence[UnitT]
+) -> Iterator[UnitResult[UnitT, ResultT]]:
+    pickled = pickle.dumps(task)
+    waiting: deque[tuple[UnitT, list[ResultT] | None, Any]] = deque()
+    for unit in units:
+        done = task.done(unit)
+        future = executor.submit(do_unit, pickled, unit) if done is None else None
+        waiting.append((unit, done, future))
+        while waiting and (len(waiting) > AHEAD or waiting[0][2] is None or waiting[0][2].done()):
+            yield from _results(task, *waiting.popleft())
+    while waiting:
+        yield from _results(task, *waiting.popleft())
+
+
+def _results(
+    task: Task[UnitT, ResultT], unit: UnitT, done: list[ResultT] | None, future: Any
+) -> Iterator[UnitResult[UnitT, ResultT]]:
+    results = _awaited(task, unit, future) if done is None else done
+    for result in results:
+        yield UnitResult(unit, result, done is not None)
+
+
+def _awaited(task: Task[UnitT, ResultT], unit: UnitT, future: Any) -> Sequence[ResultT]:
+    """The results of a unit that is handed out.
+
+    Raises:
+        InputError: As for :func:`run`.
+    """
+    try:
+        results: list[ResultT] = future.result()
+        return results
+    except (BrokenExecutor, CancelledError) as error:
+        raise InputError(
+            "executor",
+            f"it ended before {unit.id} was done ({error or type(error).__name__})",
+            "Run the same command again: it goes on with what is not done.",
+        ) from error
+    except UnfitWorkerError:
+        raise
+    except InputError as error:
+        return task.fail(unit, error)
+    except Exception as error:  # whatever the executor's own processes raise
+        reason = f"its worker failed ({type(error).__name__}: {error})"
+        return task.fail(unit, InputError(unit.id, reason, "See the log of the worker."))
+
+
+def do_unit(pickled: bytes, unit: UnitT) -> list[Any]:
+    """Does a unit in a process of an executor.
+
+    Args:
+        pickled: The :class:`Task`.
+        unit: The unit.
+    """
+    return list(_task(pickled).do(unit))
+
+
+# The last task of each thread: methods keep what they have seen, so that no two threads share one.
+_last = threading.local()
+
+
+def _task(pickled: bytes) -> Task[Any, Any]:
+    """The task that a thread keeps while it does one unit after the other.
+
+    Raises:
+        UnfitWorkerError: It cannot be done there.
+    """
+    if getattr(_last, "pickled", None) == pickled:
+        return cast(Task[Any, Any], _last.task)
+    try:
+        task: Task[Any, Any] = pickle.loads(pickled)
+        task.check()
+    except InputError as error:
+        where = f"worker {platform.node()}: {error.subject}"
+        raise UnfitWorkerError(where, error.reason, error.remedy) from error
+    _last.pickled, _last.task = pickled, task
+    return task

@@ -1,0 +1,110 @@
+"""One of several equal shares of a job, each done by a command of its own."""
+
+import heapq
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Self, TypeVar
+
+from derain.errors import InputError
+from derain.jobs.unit import Unit
+
+# What SLURM gives each task of an array: its number, how many there are, and the first number.
+# Source: sbatch(1), "Output environment variables".
+TASK, TASKS, FIRST_TASK = "SLURM_ARRAY_TASK_ID", "SLURM_ARRAY_TASK_COUNT", "SLURM_ARRAY_TASK_MIN"
+
+UnitT = TypeVar("UnitT", bound=Unit)
+
+
+@dataclass(frozen=True)
+class Shard:
+    """One of several shares.
+
+    Attributes:
+        number: Which, from 0.
+        count: How many there are.
+        first: What a batch system calls the first of them.
+
+    Raises:
+        InputError: No such share.
+    """
+
+    number: int
+    count: int
+    first: int = 0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.number < self.count:
+            raise InputError(
+                "--shard",
+                f"there is no share {self.number + self.first} of {self.count}: they are "
+                f"{self.first} to {self.first + self.count - 1}",
+                "Give one of them.",
+            )
+
+    @classmethod
+    def of_text(cls, text: str) -> Self:
+        """The share that ``I/N`` names, the first of which is 0/N.
+
+        Raises:
+            ValueError: Other text.
+        """
+        match = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", text, re.ASCII)
+        if match is None:
+            raise ValueError(f"{text} is not I/N, such as 0/4")
+        return cls(int(match[1]), int(match[2]))
+
+    @classmethod
+    def of_environment(cls, environment: Mapping[str, str] = os.environ) -> Self | None:
+        """The share of this task of a SLURM array; None outside of an array."""
+        if TASK not in environment:
+            return None
+        first = int(environment.get(FIRST_TASK, "0"))
+        number = int(environment[TASK]) - first
+        return cls(number, max(int(environment.get(TASKS, "1")), number + 1), first)
+
+    def of(self, units: Sequence[UnitT]) -> list[UnitT]:
+        """The units of this share, in their order: see :func:`shares`."""
+        number_of = shares(units, self.count)
+        return [unit for unit in units if number_of[unit.id] == self.number]
+
+
+def shares(units: Sequence[Unit], count: int) -> dict[str, int]:
+    """The share of each unit, so that all shares are about as large.
+
+    The largest unit comes first, and each goes to the share that is smallest by then. Only ids and
+    sizes matter, and not the order of the units.
+
+    Args:
+        units: The units.
+        count: How many shares there are.
+
+    Returns:
+        Number of the share, from 0, by the id of each unit.
+
+    Source: longest processing time first, R. L. Graham, "Bounds on Multiprocessing Timing
+        Anomalies", 1969.
+    """
+    smallest = [(0, number) for number in range(count)]
+    found = {}
+    for unit in sorted(units, key=lambda unit: (-unit.size, unit.id)):
+        size, number = heapq.heappop(smallest)
+        found[unit.id] = number
+        heapq.heappush(smallest, (size + unit.size, number))
+    return found
+
+
+def array_expression(numbers: Sequence[int]) -> str:
+    """Numbers of tasks as ``sbatch --array`` takes them, such as ``0-3,7``.
+
+    Args:
+        numbers: The numbers, in any order.
+    """
+    ranges: list[list[int]] = []
+    for number in sorted(set(numbers)):
+        if ranges and number == ranges[-1][-1] + 1:
+            ranges[-1][1:] = [number]
+        else:
+            ranges.append([number])
+    return ",".join("-".join(map(str, each)) for each in ranges)

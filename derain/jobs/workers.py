@@ -1,0 +1,141 @@
+"""Processes of this machine that do units, and what becomes of a unit whose process dies."""
+
+import multiprocessing
+import pickle
+import signal
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from multiprocessing.connection import Connection
+from queue import SimpleQueue
+from typing import Any, ParamSpec, Self, TypeVar
+
+from derain.errors import InputError
+from derain.system.workers import end_with_parent, without_main_module
+
+# A unit is tried so often while its process dies.
+TRIES = 3
+
+Given = ParamSpec("Given")
+Result = TypeVar("Result")
+
+
+class WorkerPool(ThreadPoolExecutor):
+    """Processes of this machine, each of which does one piece of work after the other.
+
+    Where a process dies, for instance because memory is full, a new one does its work again. Work
+    whose process always dies fails with an InputError, and the other work goes on.
+
+    A ``with`` block ends them: after an error at once, otherwise when all work is done.
+
+    Args:
+        workers: Number of processes.
+    """
+
+    def __init__(self, workers: int) -> None:
+        super().__init__(workers)
+        self._workers = [_Worker() for _ in range(workers)]
+        self._idle = SimpleQueue[_Worker]()
+        for worker in self._workers:
+            self._idle.put(worker)
+        self._ended = False
+
+    def submit(
+        self, work: Callable[Given, Result], /, *given: Given.args, **named: Given.kwargs
+    ) -> Future[Result]:
+        """Has work done by the next process that is idle."""
+        return super().submit(self._done, pickle.dumps((work, given, named)))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self._ended = kind is not None
+        if self._ended:
+            self._kill()
+        self.shutdown(wait=True, cancel_futures=self._ended)
+        self._kill()
+
+    def _kill(self) -> None:
+        for worker in self._workers:
+            worker.kill()
+
+    def _done(self, task: bytes) -> Any:
+        """Waits for a process and for its answer, in a thread of this process."""
+        worker = self._idle.get()
+        try:
+            for _ in range(TRIES):
+                try:
+                    succeeded, answer = worker.ask(task)
+                except (EOFError, OSError):
+                    worker.kill()
+                    if self._ended:
+                        break
+                    continue
+                if succeeded:
+                    return answer
+                raise answer
+        finally:
+            self._idle.put(worker)
+        raise InputError(
+            "worker",
+            f"its process died {TRIES} times",
+            "See whether memory is full; fewer --workers need less.",
+        )
+
+
+class _Worker:
+    """A process that is started with its first work, and again after it died."""
+
+    def __init__(self) -> None:
+        self._process: multiprocessing.process.BaseProcess | None = None
+        self._connection: Connection[Any, Any] | None = None
+
+    def ask(self, task: bytes) -> tuple[bool, Any]:
+        """Has the process do something.
+
+        Args:
+            task: What to call, its arguments and those with names, pickled.
+
+        Returns:
+            Whether it succeeded, and what it returned or raised.
+
+        Raises:
+            EOFError: The process died.
+            OSError: It died earlier.
+        """
+        if self._connection is None:
+            self._start()
+        assert self._connection is not None
+        self._connection.send_bytes(task)
+        answer: tuple[bool, Any] = self._connection.recv()
+        return answer
+
+    def kill(self) -> None:
+        """Ends the process at once, whatever it does."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.join()
+        self._process = self._connection = None
+
+    def _start(self) -> None:
+        # Not forked: a fork has the locks of this process, but not the threads that release them.
+        context = multiprocessing.get_context("spawn")
+        self._connection, theirs = context.Pipe()
+        self._process = context.Process(target=_serve, args=(theirs,), daemon=True)
+        with without_main_module():
+            self._process.start()
+        theirs.close()  # so that the connection ends with the process
+
+
+def _serve(connection: "Connection[Any, Any]") -> None:
+    """Does what it is asked for until its process is killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal: whoever began this ends it
+    end_with_parent()
+    while True:
+        task = connection.recv_bytes()
+        try:
+            work, given, named = pickle.loads(task)
+            answer = True, work(*given, **named)
+        except Exception as error:
+            answer = False, error
+        connection.send(answer)

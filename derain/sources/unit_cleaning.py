@@ -1,0 +1,171 @@
+"""Cleans the scans of one unit: judges them, measures their weather, and writes them."""
+
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from derain.errors import InputError
+from derain.files.reading import reading
+from derain.jobs.running import Work
+from derain.sources.clean_sink import CleanSink
+from derain.sources.cleaned_scan import CleanedScan, ScanOutcome, unpacked
+from derain.sources.frame import Frame, time_of
+from derain.sources.judgement import Judgement
+from derain.sources.judging import judgements
+from derain.sources.method import Method
+from derain.sources.source import Frames, Source
+from derain.sources.units import FrameUnit
+from derain.system.stopwatch import Stopwatch
+from derain.views.scan_issues import (
+    HEAVIEST_RAIN,
+    ScanIssue,
+    left_out,
+    much_removed,
+    no_points,
+)
+
+# Receives the judgement of each scan before it is written.
+OnJudgement = Callable[[Judgement], None]
+
+
+@dataclass(frozen=True)
+class UnitCleaning(Work[FrameUnit, ScanOutcome]):
+    """Cleans the scans of one unit after the other.
+
+    Attributes:
+        method: What judges them.
+        sink_for: Makes the sink of a unit.
+        most_removed: Scans with a greater share of rain in their valid points are not written.
+        measured: Keys of the scans whose weather is measured; None measures all.
+        fingerprint: That of the method where the job began.
+    """
+
+    method: Method
+    sink_for: Callable[[Source], CleanSink]
+    most_removed: float
+    measured: Collection[str] | None
+    fingerprint: str
+
+    def check(self) -> None:
+        """Refuses a method that is another one here, such as a model's file that has changed."""
+        if self.method.fingerprint() != self.fingerprint:
+            raise InputError(
+                str(self.method.as_dict()["method"]),
+                "is not the same here as where the run began",
+                "Copy the file to every machine.",
+            )
+
+    def do(self, unit: FrameUnit) -> Iterator[ScanOutcome]:
+        """Cleans the scans of a unit."""
+        with self.sink_for(Frames(unit.frames)) as sink:
+            yield from self.clean(unit, sink)
+
+    def clean(
+        self, unit: FrameUnit, sink: CleanSink, on_judgement: OnJudgement = lambda judgement: None
+    ) -> Iterator[ScanOutcome]:
+        """Cleans the scans of a unit and writes them to an open sink.
+
+        Args:
+            unit: The unit.
+            sink: Where they are written.
+            on_judgement: Receives each judgement.
+
+        Yields:
+            What became of each scan.
+        """
+        own, ready = set(unit.frames), list[ScanOutcome]()
+
+        @contextmanager
+        def catching(frame: Frame) -> Iterator[None]:
+            try:
+                with reading(Path(frame.name)):  # which names the file where the memory is full
+                    yield
+            except InputError as error:
+                if frame in own:
+                    ready.append(ScanOutcome(frame, [], error=error))
+
+        frames = (*unit.before, *unit.frames, *unit.after)
+        for frame, judgement, stopwatch in judgements(self.method, frames, catching):
+            yield from _drained(ready)
+            if frame in own:
+                on_judgement(judgement)
+                with catching(frame):
+                    ready.append(self._cleaned(frame, judgement, stopwatch, sink))
+                yield from _drained(ready)
+            if unit.after and frame is unit.frames[-1]:
+                break  # those after it need no answer
+        yield from _drained(ready)
+
+    def is_there(self, unit: FrameUnit) -> bool:
+        """Whether all files and bags of the unit are there."""
+        return all(path.exists() for path in self.sink_for(Frames(unit.frames)).targets())
+
+    def failed(self, unit: FrameUnit, error: InputError) -> Iterator[ScanOutcome]:
+        """The outcome of a unit that failed as a whole, which is that of its first scan."""
+        yield ScanOutcome(unit.frames[0], [], error=error)
+
+    def error_of(self, outcome: ScanOutcome) -> InputError | None:
+        """Why a scan was not cleaned."""
+        return outcome.error
+
+    def to_json(self, outcome: ScanOutcome) -> dict[str, Any]:
+        """The outcome of a cleaned scan as a record has it."""
+        return outcome.as_dict()
+
+    def from_json(self, unit: FrameUnit, written: dict[str, Any]) -> ScanOutcome:
+        """The outcome that a record has."""
+        figures = dict(written)
+        key, seconds, measured = (figures.pop(name) for name in ("key", "seconds", "measured"))
+        return ScanOutcome(
+            next(frame for frame in unit.frames if frame.key == key),
+            [],
+            CleanedScan(**figures),
+            seconds,
+            None if measured is None else unpacked(measured),
+        )
+
+    def _cleaned(
+        self, frame: Frame, judgement: Judgement, stopwatch: Stopwatch, sink: CleanSink
+    ) -> ScanOutcome:
+        issues = _issues(self.method, judgement, self.most_removed)
+        share = judgement.share_of_rain
+        if share > self.most_removed:
+            error = InputError(
+                frame.name,
+                f"left whole, for {share:.1%} of its valid points are called rain, where the "
+                f"heaviest rain has {HEAVIEST_RAIN:.0%}",
+                "See whether the method suits sensor and unit of intensity, or raise "
+                "--most-removed.",
+            )
+            return ScanOutcome(frame, issues, error=error)
+        with stopwatch.stage("weather"):
+            due = self.measured is None or frame.key in self.measured
+            measured = judgement.weather if due else None
+        with stopwatch.stage("write"):
+            sink.write(judgement)
+        valid, known = judgement.scan.valid, judgement.known
+        figures = CleanedScan(
+            scan=frame.name,
+            points=len(valid),
+            valid=int(valid.sum()),
+            rain=int(judgement.rain.sum()),
+            share_removed=share,
+            not_known=None if known is None else int((valid & ~judgement.answered).sum()),
+            milliseconds=dict(stopwatch.milliseconds),
+            warnings=[issue.detail for issue in issues],
+        )
+        return ScanOutcome(frame, issues, figures, time_of(frame), measured)
+
+
+def _drained(outcomes: list[ScanOutcome]) -> Iterator[ScanOutcome]:
+    """Takes outcomes from the beginning of a list, until it is empty."""
+    while outcomes:
+        yield outcomes.pop(0)
+
+
+def _issues(method: Method, judgement: Judgement, most_removed: float) -> list[ScanIssue]:
+    scan, share = judgement.scan, judgement.share_of_rain
+    odd = [*method.issues(judgement), *left_out(scan), *no_points(scan)]
+    return odd if share > most_removed else [*odd, *much_removed(share)]

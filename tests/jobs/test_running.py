@@ -1,0 +1,138 @@
+"""Jobs: each unit done once, what failed done again, and nothing done by other options."""
+
+import json
+from collections.abc import Callable
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from jobs.counting import Counting
+
+from derain.errors import InputError
+from derain.jobs.job import Job
+from derain.jobs.running import Task, UnfitWorkerError, run
+from derain.jobs.shard import Shard
+from derain.jobs.status import job_status
+from derain.jobs.unit import Unit
+from derain.jobs.workers import TRIES, WorkerPool
+
+OPTIONS = {"command": "count", "size": 3}
+UNITS = [Unit(id=f"drive/{place}", size=1, inputs="unchanged") for place in range(5)]
+EXECUTORS: list[Callable[[], Executor]] = [
+    lambda: WorkerPool(2),
+    lambda: ThreadPoolExecutor(2),
+    lambda: ProcessPoolExecutor(2),
+]
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    (tmp_path / "drive").mkdir()
+    return tmp_path
+
+
+def begun(out: Path, units: list[Unit] = UNITS, **options: object) -> Job:
+    job = Job.begin(out, {**OPTIONS, **options}, None)
+    job.list_units(units)
+    return job
+
+
+def tries(out: Path, unit: str) -> int:
+    return len((out / f"{unit}.tries").read_text().splitlines())
+
+
+def results(
+    out: Path, work: Counting, executor: Executor | None = None, units: list[Unit] = UNITS
+) -> list[tuple[str, bool]]:
+    found = run(Task(begun(out, units), work), units, executor)
+    return [(each.result, each.before) for each in found]
+
+
+def test_a_second_run_does_nothing_again(out: Path) -> None:
+    assert results(out, Counting(out)) == [(f"{unit.id} done", False) for unit in UNITS]
+    assert results(out, Counting(out)) == [(f"{unit.id} done", True) for unit in UNITS]
+    assert all(tries(out, unit.id) == 1 for unit in UNITS)
+
+
+@pytest.mark.parametrize("executor", EXECUTORS)
+def test_executors_give_the_same_in_the_same_order(
+    out: Path, executor: Callable[[], Executor]
+) -> None:
+    with executor() as pool:
+        found = results(out, Counting(out, failing=("drive/2",)), pool)
+    done = [f"{unit.id} done" for unit in UNITS]
+    assert [each for each, _ in found if not each.startswith("failed")] == [*done[:2], *done[3:]]
+    assert "is broken" in found[2][0]
+    (failed,) = job_status(out, lambda record: None).failed
+    assert failed.unit == "drive/2"
+
+
+def test_units_that_failed_changed_or_lost_their_files_are_done_again(out: Path) -> None:
+    results(out, Counting(out, failing=("drive/0",)))
+    (out / "drive" / "1.txt").unlink()
+    (out / ".derain" / "units" / "drive" / "2.json").write_text('{"half": ')
+    changed = [*UNITS[:3], replace(UNITS[3], inputs="changed"), UNITS[4]]
+    results(out, Counting(out), units=changed)
+    assert [tries(out, unit.id) for unit in UNITS] == [2, 2, 2, 2, 1]
+
+
+def test_other_options_are_refused_and_named(out: Path) -> None:
+    results(out, Counting(out))
+    with pytest.raises(InputError, match="size was 3 and is 4"):
+        begun(out, size=4)
+    with pytest.raises(InputError, match="colour was not there and is red"):
+        begun(out, colour="red")
+    anew = Job.begin(out, {**OPTIONS, "size": 4}, None, anew=True)
+    assert anew.record_of(UNITS[0]) is None
+
+
+def test_a_unit_that_kills_its_process_is_passed_over_after_three_tries(out: Path) -> None:
+    with WorkerPool(2) as pool:
+        found = results(out, Counting(out, killing=("drive/1",)), pool)
+    assert tries(out, "drive/1") == TRIES
+    assert [each.partition(" ")[2] for each, _ in found[2:]] == ["done"] * 3
+    (failed,) = job_status(out, lambda record: None).failed
+    assert f"died {TRIES} times" in failed.errors[0][1]
+
+
+@pytest.mark.parametrize("executor", EXECUTORS)
+def test_processes_that_cannot_do_the_work_end_it_with_one_reason(
+    out: Path, executor: Callable[[], Executor]
+) -> None:
+    with executor() as pool, pytest.raises(UnfitWorkerError, match=r"worker .*model\.onnx"):
+        results(out, Counting(out, unfit=True), pool)
+    assert len(job_status(out, lambda record: None).missing) == 5
+
+
+def test_another_version_of_derain_is_refused(out: Path) -> None:
+    task = Task(begun(out), Counting(out), version="0.0.1")
+    with pytest.raises(InputError, match=r"this command 0\.0\.1"):
+        task.check()
+
+
+def test_an_executor_that_has_ended_is_reported_and_the_rest_is_done_later(out: Path) -> None:
+    with ProcessPoolExecutor(1) as pool, pytest.raises(InputError, match="ended before drive/"):
+        results(out, Counting(out, killing=("drive/1",)), pool)
+    assert results(out, Counting(out))[0] == ("drive/0 done", True)
+
+
+def test_the_status_names_what_is_to_be_done_again(out: Path) -> None:
+    job = Job.begin(out, OPTIONS, Shard(0, 5, first=1))
+    job.list_units(UNITS)
+    done = UNITS[:2]
+    list(run(Task(job, Counting(out, failing=("drive/0",))), done))
+    recorded: list[str] = []
+    status = job_status(out, lambda record: recorded.append(record.unit))
+    assert (status.done, recorded) == (1, ["drive/1"])
+    assert [record.unit for record in status.failed] == ["drive/0"]
+    assert [unit.id for unit in status.missing] == ["drive/2", "drive/3", "drive/4"]
+    assert status.array == "1,3-5"
+
+
+def test_a_folder_without_a_job_has_no_status(out: Path) -> None:
+    (out / ".derain").mkdir()
+    for content in ("", "[]", json.dumps({"options": 3, "shards": None})):
+        (out / ".derain" / "job.json").write_text(content)
+        with pytest.raises(InputError, match="no records of a job"):
+            Job.at(out)

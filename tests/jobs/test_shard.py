@@ -1,0 +1,66 @@
+"""Shares of a job: complete, disjoint, balanced, and the same for every task."""
+
+import random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from derain.errors import InputError
+from derain.jobs.shard import Shard, array_expression, shares
+from derain.jobs.unit import Unit
+
+SIZES = st.lists(st.integers(0, 10**9), max_size=60)
+
+
+def units_of(sizes: list[int]) -> list[Unit]:
+    return [Unit(id=f"{place}", size=size, inputs="") for place, size in enumerate(sizes)]
+
+
+@given(SIZES, st.integers(1, 9), st.randoms())
+def test_shares_hold_each_unit_once_whatever_the_order(
+    sizes: list[int], count: int, generator: random.Random
+) -> None:
+    units = units_of(sizes)
+    number_of = shares(units, count)
+    assert number_of.keys() == {unit.id for unit in units}
+    generator.shuffle(units)
+    assert shares(units, count) == number_of
+    parts = [Shard(number, count).of(units) for number in range(count)]
+    assert sorted(unit.id for part in parts for unit in part) == sorted(number_of)
+
+
+@given(SIZES, st.integers(1, 9))
+def test_no_share_is_larger_than_another_by_more_than_its_last_unit(
+    sizes: list[int], count: int
+) -> None:
+    units = units_of(sizes)
+    loads = [sum(unit.size for unit in Shard(n, count).of(units)) for n in range(count)]
+    assert max(loads) - min(loads) <= max(sizes, default=0)
+
+
+@given(st.sets(st.integers(0, 300)))
+def test_an_array_expression_names_each_task_once(numbers: set[int]) -> None:
+    named: list[int] = []
+    for part in filter(None, array_expression(list(numbers)).split(",")):
+        first, _, last = part.partition("-")
+        named += range(int(first), int(last or first) + 1)
+    assert named == sorted(numbers)
+
+
+def test_the_tasks_of_a_slurm_array_are_counted_from_its_first() -> None:
+    environment = {
+        "SLURM_ARRAY_TASK_ID": "7",
+        "SLURM_ARRAY_TASK_MIN": "5",
+        "SLURM_ARRAY_TASK_COUNT": "4",
+    }
+    assert Shard.of_environment(environment) == Shard(2, 4, first=5)
+    assert Shard.of_environment({}) is None
+
+
+def test_a_share_that_is_not_there_is_refused() -> None:
+    with pytest.raises(InputError, match=r"no share 4 of 4.*0 to 3"):
+        Shard.of_text("4/4")
+    for text in ("4", "a/b", "-1/4", "1/0x4"):
+        with pytest.raises(ValueError, match="I/N"):
+            Shard.of_text(text)
