@@ -32,7 +32,8 @@ types: $(READY)
 
 # The site in build/site; a warning is an error.
 docs: $(READY)
-	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict
+	$(PYTHON) -m docs.tools.package_tree
+	$(PYTHON) -m zensical build --clean --strict
 
 # The wheel and the source distribution, each built, compared, installed alone, and run.
 dist: $(READY)
