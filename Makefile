@@ -33,7 +33,9 @@ types: $(READY)
 # The site in build/site; a warning is an error.
 docs: $(READY)
 	$(PYTHON) -m docs.tools.package_tree
+	$(PYTHON) -m docs.tools.notebook docs/first_scan.ipynb build/docs/first_scan.md
 	$(PYTHON) -m zensical build --clean --strict
+	$(PYTHON) -m docs.tools.llms_text
 
 # The wheel and the source distribution, each built, compared, installed alone, and run.
 dist: $(READY)
