@@ -30,23 +30,25 @@ def llms_text(site: dict[str, Any]) -> str:
     for entry in site["nav"]:
         ((group, pages),) = entry.items()
         lines += ["", f"## {group}", ""]
-        lines += [f"- [{title}]({_address(page)})" for title, page in _pages(pages, group)]
+        lines += [f"- [{title}]({_address(page)})" for title, page in _pages(pages)]
     return "\n".join(lines) + "\n"
 
 
-def _pages(entries: list[Any], group: str) -> Iterator[tuple[str, str]]:
-    """The title and the file of every page below a group; its first page may have its title."""
+def _pages(entries: list[dict[str, Any]]) -> Iterator[tuple[str, str]]:
+    """The title and the file of every page below a group."""
     for entry in entries:
-        title, content = next(iter(entry.items())) if isinstance(entry, dict) else (group, entry)
+        ((title, content),) = entry.items()
         if isinstance(content, list):
-            yield from _pages(content, title)
+            yield from _pages(content)
         else:
             yield title, content
 
 
 def _address(page: str) -> str:
     """Where the site has a page, from its root."""
-    return page.removesuffix("index.md") if page.endswith("index.md") else f"{page[:-3]}/"
+    if page == "index.md":
+        return "./"
+    return page.removesuffix("index.md").removesuffix(".md").rstrip("/") + "/"
 
 
 if __name__ == "__main__":

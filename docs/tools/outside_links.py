@@ -28,11 +28,11 @@ class OutsideLinks(Preprocessor):
 class OutsideLinksExtension(Extension):
     """Adds the above to Python-Markdown."""
 
-    def extendMarkdown(self, md: Markdown) -> None:
+    def extendMarkdown(self, md: Markdown) -> None:  # noqa: N802
         """Registers the preprocessor."""
         md.preprocessors.register(OutsideLinks(md), "outside_links", AFTER_SNIPPETS)
 
 
-def makeExtension(**options: object) -> OutsideLinksExtension:
+def makeExtension(**options: object) -> OutsideLinksExtension:  # noqa: N802
     """Makes the extension, as Python-Markdown asks."""
     return OutsideLinksExtension(**options)

@@ -132,6 +132,13 @@ def test_commands_stand_in_fences(page: Path) -> None:
     assert not re.findall(r"^ {4}(?:derain|pip|python3?|make|tensorboard) .*", text, re.MULTILINE)
 
 
+def test_every_page_stands_in_the_navigation_once() -> None:
+    navigation = (REPOSITORY / "mkdocs.yml").read_text("utf-8")
+    named = re.findall(r"^ +- .+: (\S+\.md)$", navigation, re.MULTILINE)
+    pages = [page for page in PAGES[1:] if page.suffix == ".md"]
+    assert sorted(named) == [page.relative_to(REPOSITORY / "docs").as_posix() for page in pages]
+
+
 def test_every_name_that_derain_offers_stands_in_the_reference() -> None:
     pages = "".join(page.read_text("utf-8") for page in PAGES[1:])
     shown = {name.rsplit(".", 1)[-1] for name in re.findall(r"^::: ([\w.]+)$", pages, re.MULTILINE)}
