@@ -50,4 +50,4 @@ $(READY): pyproject.toml constraints.txt
 	touch $@
 
 clean:
-	rm -rf $(VENV) build dist demo runs *.egg-info
+	rm -rf $(VENV) .cache build dist demo runs *.egg-info

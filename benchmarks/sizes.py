@@ -1,30 +1,30 @@
-"""Times methods on scans of 10,000 to 1,300,000 points, each alone in a process, with its memory.
+"""Measures time and memory of methods on scans of 10,000 to 1,300,000 points, each in a process.
 
     python -m benchmarks.sizes --methods default crf dror dsor ror sor ssr outdet.onnx
 
 The scans are of one simulated street in the rain, as seen by spinning sensors of more and more
-beams. All methods take turns, and a time is the least of all rounds: what else the machine does
-only adds to it.
+beams. The time is what one core works on a scan, the least of several: unlike the time that passes,
+it grows little when others use the machine.
 """
 
 import argparse
 import tempfile
-from collections import defaultdict
-from collections.abc import Sequence
-from itertools import product
+import time
 from pathlib import Path
 
 import numpy as np
 import yaml
 
 from derain.cli.main import main as derain
-from derain.export.bench.bench_entries import bench_entries
-from derain.export.bench.cost import Cost, Timing, measure_cost
+from derain.export.bench.bench_entries import BenchEntry, bench_entries
+from derain.export.bench.cost import Timing, measure_in_process
 from derain.export.machine import versions
 from derain.files import read_scan, write_scan
 from derain.simulation.sensor import packaged_sensors
 from derain.sources.folders import frame_of
 from derain.sources.frame import Frame
+from derain.system.stopwatch import Stopwatch
+from derain.system.workers import worker_pool
 
 # Rows and columns of a sensor of which some more points return than are taken.
 SENSORS = {
@@ -42,24 +42,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--methods", nargs="+", required=True)
     parser.add_argument("--points", nargs="+", type=int, choices=SENSORS, default=[*SENSORS])
-    parser.add_argument("--threads", type=int, default=2)
-    parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--repeats", type=int, default=4, help="in each round")
+    parser.add_argument("--repeats", type=int, default=2)
     arguments = parser.parse_args()
 
-    entries = bench_entries(arguments.methods)
-    costs: dict[tuple[str, int], list[Cost]] = defaultdict(list)
     with tempfile.TemporaryDirectory() as folder:
-        frames = {points: simulated(points, Path(folder)) for points in arguments.points}
-        for _, entry, points in product(range(arguments.rounds), entries, frames):
-            timing = Timing([frames[points]], arguments.threads, arguments.repeats)
-            costs[entry.title, points].append(measure_cost(entry, timing))
-    print("| method |", " | ".join(f"{points:,}" for points in frames), "|")
-    print("|---|" + "---:|" * len(frames))
-    for entry in entries:
-        cells = [_cell(costs[entry.title, points]) for points in frames]
-        print(f"| {entry.title} |", " | ".join(cells), "|")
-    print(f"{arguments.threads} threads; {versions()}")
+        frames = [simulated(points, Path(folder)) for points in arguments.points]
+        print("| method |", " | ".join(f"{points:,}" for points in arguments.points), "|")
+        print("|---|" + "---:|" * len(frames))
+        for entry in bench_entries(arguments.methods):
+            cells = [_cell(entry, frame, arguments.repeats) for frame in frames]
+            print(f"| {entry.title} |", " | ".join(cells), "|", flush=True)
+    print(versions())
 
 
 def simulated(points: int, folder: Path) -> Frame:
@@ -78,11 +71,28 @@ def simulated(points: int, folder: Path) -> Frame:
     return frame_of(folder / f"{points}.bin")
 
 
-def _cell(costs: Sequence[Cost]) -> str:
-    """The least time, and the largest memory."""
-    milliseconds = min(cost.times.total.min() for cost in costs)
-    mebibytes = max(cost.peak_memory or 0 for cost in costs)
-    return f"{milliseconds:,.0f} ms, {mebibytes:,.0f} MiB"
+def measured(entry: BenchEntry, frame: Frame, repeats: int) -> tuple[float, float]:
+    """Measures a method in this process.
+
+    Returns:
+        The least milliseconds that a core works on the scan, from file to mask, and the largest
+        memory of the process, MiB.
+    """
+    memory = measure_in_process(entry, Timing([frame], threads=1, repeats=1)).peak_memory
+    assert memory is not None, "this system does not tell the largest memory of a process"
+    method = entry.ready(1)
+    times = []
+    for _ in range(repeats):
+        start = time.process_time()
+        method(frame.read(), Stopwatch())
+        times.append(time.process_time() - start)
+    return 1e3 * min(times), memory
+
+
+def _cell(entry: BenchEntry, frame: Frame, repeats: int) -> str:
+    with worker_pool(1) as pool:
+        milliseconds, memory = pool.submit(measured, entry, frame, repeats).result()
+    return f"{milliseconds:,.0f} ms, {memory:,.0f} MiB"
 
 
 if __name__ == "__main__":
