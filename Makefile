@@ -32,7 +32,10 @@ types: $(READY)
 
 # The site in build/site; a warning is an error.
 docs: $(READY)
-	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict
+	$(PYTHON) -m docs.tools.package_tree
+	$(PYTHON) -m docs.tools.notebook docs/first_scan.ipynb build/docs/first_scan.md
+	$(PYTHON) -m zensical build --clean --strict
+	$(PYTHON) -m docs.tools.llms_text
 
 # The wheel and the source distribution, each built, compared, installed alone, and run.
 dist: $(READY)
@@ -47,4 +50,4 @@ $(READY): pyproject.toml constraints.txt
 	touch $@
 
 clean:
-	rm -rf $(VENV) build dist demo runs *.egg-info
+	rm -rf $(VENV) .cache build dist demo runs *.egg-info
