@@ -30,8 +30,8 @@ all scans. Write ./crf for a folder called crf.
 The model that comes with derain judges the scans of a recording by the scans around them, too:
 solid things are where they were, rain is not. Where the sensor was comes from the poses, or else
 from the scans; where that is not known, or with --alone, each scan is judged by itself.
-Methods that see several scans need the scans of a recording in time order. Where a method is not
-sure of a point, its best guess decides. Results of a data set are named by their paths in it.
+Methods that see several scans need the scans of a recording in time order. A point of which a
+method is not sure stays. Results of a data set are named by their paths in it.
 A bag (.bag of ROS 1; .mcap, .db3 or a folder of ROS 2) becomes a bag of the same name: the clouds
 of one topic have no rain, and everything else stays the same, byte for byte.
 derain warns once of each fault of the scans. It skips scans with more than --most-removed rain: it
