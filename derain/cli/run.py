@@ -72,6 +72,7 @@ from derain.cli.weather_options import (
 from derain.default import DEFAULT, model_card
 from derain.errors import InputError
 from derain.example import Truth
+from derain.export.methods import CUES, DELAY, PAST
 from derain.export.runtime import Derainer
 from derain.sources.clean_sink import CleanSink, require_probabilities
 from derain.sources.cleaned_bags import RAIN_PROBABILITY, BagOptions
@@ -87,18 +88,12 @@ from derain.views.scan_issues import MOST_RAIN, ScanIssue
 from derain.weather.record import weather_row
 from derain.workflows.odometry import placed
 
-# Scans before and after each that a model sees by default, as far as they are of its recording.
-PAST, DELAY = 1, 1
-
 # Options that only --help-all shows.
 RARE = (
     *("--runtime", "--precision", "--parameters", "--columns", "--intensity-scale"),
     *("--probability", "--most-removed", "--past", "--delay", "--topic", "--cleaned-topic"),
     *("--removed-topic", "--keep-shape", "--dry", "--warning", "--error", "--hold"),
 )
-
-# The network that sees them unasked.
-CUES = "cues"
 
 
 def add_arguments(parser: Parser) -> None:

@@ -51,6 +51,15 @@ def test_it_tells_of_every_scan_and_of_all(succeed, drive: Path, tmp_path: Path)
     assert Manifest.read(out).teacher == {"method": "between", "rain_below": 7, "sure_within": 30.0}
 
 
+def test_scans_alone_are_labelled_by_the_model_that_comes_with_derain_over_the_recording(
+    succeed, drive: Path, tmp_path: Path
+) -> None:
+    for number, words in enumerate(([drive], ["default", drive])):
+        succeed("teach", *words, "--out", tmp_path / f"{number}")
+        teacher = Manifest.read(tmp_path / f"{number}").teacher
+        assert (teacher["method"], teacher["past"], teacher["delay"]) == ("default", 1, 1)
+
+
 def test_truth_is_measured_for_the_record_where_a_card_explains_it(
     succeed, drive: Path, tmp_path: Path
 ) -> None:
