@@ -8,7 +8,7 @@ points that are not known.
   derain teach crf drive/ other_drive/ --out taught
   derain teach persistence drive/ --out taught
   derain teach persistence WADS/sequences/36 --out taught --card wads
-  derain fit --config outdet_taught.yaml --data.root taught
+  derain fit --config cues_taught.yaml --data.root taught --start default
 
 METHOD is a method that sees several scans, a filter, the model that comes with derain (below), a
 model of your own (.onnx), or parameters from `derain tune` (.yaml). It is optional: if the first
