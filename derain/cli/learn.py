@@ -15,7 +15,7 @@ describes how far to trust it, with the commands that repeat each step.
 
 The default teacher is the model that comes with derain, which sees the scans before and after each;
 the network begins with the weights of the same model. Where --model or --blind asks for another
-network, its weights are drawn at random. The teacher persistence has learnt nothing: to it, solid
+network, its weights are drawn at random. The teacher persistence goes by free space alone: solid
 things stay in their place, and drops do not. The report compares the two. Labels beside the scans
 are not read; with --card, they measure the finished model, for the record. Labels, runs and report
 go to a folder beside the model, which a second run clears.

@@ -41,8 +41,8 @@ learn errors that the teacher makes only now and then."""
 
 
 BESIDE_PERSISTENCE = """\
-Persistence calls rain what rays of the scans before and after went through, and knows neither
-intensity nor anything learnt. On held-out scans, beside this teacher:"""
+Persistence goes by free space alone: rain is what rays of the scans before and after went through,
+however bright it is. On held-out scans, beside this teacher:"""
 
 
 @dataclass
