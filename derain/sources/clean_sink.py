@@ -93,7 +93,7 @@ class CleanSink:
         yield from self._bags.targets()
 
     def write(self, judgement: Judgement) -> None:
-        """Writes a scan without its rain; a method's best guess decides where it is not sure.
+        """Writes a scan without its rain.
 
         Args:
             judgement: The scan, judged; scans of a bag come in the order of the bag.

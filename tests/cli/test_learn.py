@@ -163,7 +163,8 @@ def test_scans_that_nothing_connects_are_refused_with_the_reason(run_derain) -> 
     for number in range(3):
         places = np.random.default_rng(number).uniform(-40, 40, (3000, 3)).astype(np.float32)
         np.column_stack([places, places[:, :1] * 0]).tofile(recording / f"{number:06d}.bin")
-    outcome = run_derain("learn", recording, "--out", "model.onnx")
+    command = ("learn", recording, "--out", "model.onnx", "--teacher", "persistence")
+    outcome = run_derain(*command)
     assert outcome.code == 2
     assert "no two scans of the recording could be laid upon one another" in outcome.err
     assert not Path("model.onnx").exists()
@@ -208,7 +209,8 @@ def test_a_recording_without_intensities_is_learnt_without(
         raise InputError("fit", "is not run", "")
 
     monkeypatch.setattr(learn, "fit", fit)
-    outcome = run_derain("learn", recording, "--out", "model.onnx", *QUICK, "--columns", "x,y,z")
+    command = ("learn", recording, "--out", "model.onnx", *QUICK, "--model", "outdet")
+    outcome = run_derain(*command, "--columns", "x,y,z")
     assert outcome.code == 2
     assert [settings["model.channels"] for settings in trained] == ["[x,y,z]"]
     assert "no intensities" in outcome.out
