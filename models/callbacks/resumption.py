@@ -49,8 +49,8 @@ class Resumption(lightning.Callback):
         """Compares what Lightning restores next with what the run has.
 
         Raises:
-            InputError: Optimisers, schedulers or a scaler of another training, or a learning rate that
-                is planned for another number of steps.
+            InputError: Optimisers, schedulers or a scaler of another training, or a learning rate
+                that is planned for another number of steps.
         """
         checkpoint, self._checkpoint = self._checkpoint, None
         if checkpoint is None:

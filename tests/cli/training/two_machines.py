@@ -1,6 +1,6 @@
 """Trains, measures and predicts as a process of torchrun, which gives each command its turn.
 
-    torchrun ... two_machines.py CONFIG CHECKPOINT
+torchrun ... two_machines.py CONFIG CHECKPOINT
 """
 
 import sys
