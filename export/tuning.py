@@ -162,7 +162,7 @@ def tune_filter(name: str, scans: Sequence[LabelledNeighbourhoods], search: Sear
     kept = None if search.storage is None else search.storage.open()
     storage = optuna.storages.get_storage(kept)  # in memory where none is to be kept
     try:
-        shared = SharedTrials(storage, name, _distributions(space), first, search.seed)
+        shared = SharedTrials(storage, name, distributions_of(name), first, search.seed)
         _agree_on_data(shared.study, name, scans, search)
         while trial := shared.next(search.trials):
             shared.finish(trial, pooled_iou(filter_from(name, trial.params), scans))
@@ -245,14 +245,20 @@ def _agree_on_data(
         study.set_user_attr(key, fact)
 
 
-def _distributions(
-    space: Mapping[str, Span],
-) -> "dict[str, optuna.distributions.BaseDistribution]":
+def distributions_of(name: str) -> "dict[str, optuna.distributions.BaseDistribution]":
+    """What the parameters of a filter are drawn from, by name.
+
+    Args:
+        name: One of ``FILTERS``.
+
+    Raises:
+        InputError: A filter that cannot be tuned.
+    """
     from optuna.distributions import FloatDistribution, IntDistribution
 
     return {
-        name: IntDistribution(low, high)
+        parameter: IntDistribution(low, high)
         if isinstance(low, int) and isinstance(high, int)
         else FloatDistribution(low, high, log=True)
-        for name, (low, high) in space.items()
+        for parameter, (low, high) in search_space(name).items()
     }
