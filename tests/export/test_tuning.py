@@ -169,7 +169,7 @@ def test_a_search_broken_off_in_the_midst_of_a_trial_ends_as_an_unbroken_one(
         with pytest.raises(KeyboardInterrupt):
             tune_filter("dsor", seen, search(12, storage)[0])
     assert len(trials_in(storage)) == 11
-    # A trial without parameters, which no search of ours enters, is no trial.
+    # A trial that no search of ours entered is nobody's.
     optuna.load_study(study_name="dsor", storage=f"sqlite:///{storage}").ask()
     assert tune_filter("dsor", seen, search(12, storage)[0]) == unbroken
 
