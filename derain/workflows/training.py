@@ -2,6 +2,7 @@
 
 import argparse
 import logging
+import os
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -15,6 +16,7 @@ from lightning.pytorch import Trainer
 from lightning.pytorch.callbacks import LearningRateMonitor, ModelCheckpoint
 from lightning.pytorch.cli import ArgsType, LightningArgumentParser, LightningCLI
 from lightning.pytorch.loggers import TensorBoardLogger
+from torch.distributed import is_torchelastic_launched
 
 # Imported so that a configuration may name them without their modules.
 from derain.datamodules.base import ScanDataModule
@@ -189,7 +191,7 @@ class DerainCLI(LightningCLI):
             InputError: Options that no trainer can be made with.
         """
         try:
-            return save_whole(super().instantiate_trainer(**kwargs))
+            return save_whole(super().instantiate_trainer(**processes_of_torchrun(), **kwargs))
         except (ValueError, TypeError) as error:  # Lightning checks some options in these ways
             raise _of_the_trainer(error) from error
 
@@ -204,6 +206,17 @@ class DerainCLI(LightningCLI):
         start = self.config[self.config.subcommand].get("start")
         if start is not None and self.config.subcommand == "fit":
             self.model = started(self.model, checkpoint_of(start), start)
+
+
+def processes_of_torchrun() -> dict[str, int]:
+    """The trainer's machines and devices where torchrun started this process; otherwise nothing.
+
+    Lightning's own default is one machine: every process would train alone, and write its own run.
+    """
+    if not is_torchelastic_launched():
+        return {}
+    machines, processes = os.environ["GROUP_WORLD_SIZE"], os.environ["LOCAL_WORLD_SIZE"]
+    return {"num_nodes": int(machines), "devices": int(processes)}
 
 
 def _of_the_trainer(error: Exception) -> InputError:
