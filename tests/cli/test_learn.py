@@ -143,7 +143,7 @@ def test_a_folder_of_something_else_is_not_cleared(refused, recording: Path) -> 
     ("scans", "options", "names"),
     [
         (2, (), "2 scans: too few to learn from some and choose by others"),
-        (3, ("--teacher", "nobody"), "derain: nobody: no such file"),
+        (3, ("--teacher", "nobody"), "derain: nobody: no such method or file"),
         (3, ("--poses", "none.txt", "--teacher", "dror"), "none.txt"),
     ],
 )
