@@ -1,9 +1,10 @@
 # Every target sets up what it needs: python3 with venv, make and git are all that a machine must have.
 VENV := .venv
 PYTHON := $(VENV)/bin/python
+INSTALL := $(PYTHON) -m pip install --quiet --quiet -c constraints.txt
 READY := $(VENV)/.ready
 
-.PHONY: demo test test-openvino lint types docs dist clean
+.PHONY: demo test test-openvino lint types docs lock dist clean
 
 # With SCAN=path, it ends with a scan of your own.
 demo: $(READY)
@@ -16,7 +17,7 @@ test: $(READY)
 
 # Not among `make test`: a runtime of 180 MB, which nobody has to have.
 test-openvino: $(READY)
-	$(PYTHON) -m pip install --quiet -c constraints.txt -e ".[openvino]"
+	$(INSTALL) --no-build-isolation -e ".[openvino]"
 	$(PYTHON) -m pytest tests/export/runtimes
 
 lint: $(READY)
@@ -37,15 +38,20 @@ docs: $(READY)
 	$(PYTHON) -m zensical build --clean --strict
 	$(PYTHON) -m docs.tools.llms_text
 
-# The wheel and the source distribution, each built, compared, installed alone, and run.
-dist: $(READY)
-	$(PYTHON) -m release.build --out dist
+# constraints.txt anew, from the newest versions that pyproject.toml admits; torch stays.
+lock: $(READY)
+	$(PYTHON) -m release.lock
 
-# torch first and alone: with it in place, no other package brings a build of several gigabytes.
+# The wheel and the source distribution, each built, compared, installed alone, and run. With TAG=name,
+# only where that is the tag of this version.
+dist: $(READY)
+	$(PYTHON) -m release.build --out dist $(if $(TAG),--tag "$(TAG)")
+
+# pip first: that of an older Python knows no dependency groups. setuptools with it, to build derain.
 $(READY): pyproject.toml constraints.txt
 	python3 -m venv $(VENV)
-	$(PYTHON) -m pip install --quiet -c constraints.txt torch
-	$(PYTHON) -m pip install --quiet -c constraints.txt -e ".[dev]"
+	$(INSTALL) pip setuptools
+	$(INSTALL) --no-build-isolation --group dev -e ".[all,docs]"
 	$(PYTHON) -m derain.system.open3d_import
 	touch $@
 

@@ -137,7 +137,7 @@ def _loaded(name: str, parameters: Mapping[str, Any], threads: int, runtime: Run
             _refuse_runtime(name, "method", runtime)
             return METHODS[name].with_parameters(parameters, threads)
     if name != DEFAULT and not is_file(Path(name)):
-        raise InputError(name, "no such file", f"{method_hint(name)}.")
+        raise InputError(name, "no such method or file", f"{method_hint(name)}.")
     if Path(name).suffix == CHECKPOINT_SUFFIX:
         raise InputError(
             name,

@@ -188,7 +188,9 @@ def method_and_scans(
     named = of_method or (not path.suffix and is_method_name(first))
     if not (named or there):
         raise InputError(
-            first, "no such file", f"{method_hint(first)}, and scans after it; or scans alone."
+            first,
+            "no such method, file or folder",
+            f"{method_hint(first)}, and scans after it; or scans alone.",
         )
     # Formats come last: to look a suffix up may import what other packages bring.
     if not named and (not others or folder or in_bag or scan_suffix(path) in FORMATS):

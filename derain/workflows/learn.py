@@ -35,8 +35,8 @@ from derain.workflows.teaching import teach_recordings
 # A folder with this file may be cleared by a second run.
 MARK = "learning.txt"
 
-# Teaching, training and export; odometry comes first where nothing states the poses.
-LEARN_STEPS = 3
+# Teaching, training, export and measuring; odometry comes first where nothing states the poses.
+LEARN_STEPS = 4
 
 
 def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
@@ -101,8 +101,10 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
         scored = trained.iou is not None
         steps.end(f"IoU {trained.iou:.3f} on held-out scans, last epoch" if scored else "trained")
         export_checkpoint(config.checkpoint, config.out, steps)
+    steps.begin("Measuring: the model on held-out scans")
     evaluate_student(results, data, Derainer(config.out), config.card)
     write_report(results)
+    steps.end(f"report: {results.path}")
     show(f"Done in {steps.elapsed}")
     return results
 

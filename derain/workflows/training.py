@@ -57,7 +57,7 @@ from derain.workflows.run_folder import (
     logging_to_run_folder,
 )
 from derain.workflows.start import START_HELP, checkpoint_of
-from derain.workflows.training_errors import as_input_error, known_options
+from derain.workflows.training_errors import HINT, as_input_error, known_options
 
 # What `--ckpt_path` may be besides a file: checkpoints that Lightning looks for itself.
 FOUND_BY_LIGHTNING = ("last", "hpc")
@@ -221,7 +221,7 @@ def processes_of_torchrun() -> dict[str, int]:
 
 def _of_the_trainer(error: Exception) -> InputError:
     """What Lightning finds wrong with its options; it names them itself."""
-    return InputError("--trainer", str(error).rstrip("."), "Correct the option that it names.")
+    return InputError("--trainer", str(error).rstrip(".!"), HINT)
 
 
 @contextmanager

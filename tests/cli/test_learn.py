@@ -68,7 +68,7 @@ def test_a_recording_becomes_a_model_and_a_report_whatever_its_labels_say(
     outcome = succeed(*command)
     steps = [line.partition(":")[0] for line in outcome.out.splitlines()]
     assert [step for step in steps if step.istitle()][:3] == ["Teaching", "Training", "Export"]
-    assert "(step 3 of 3)" in outcome.out
+    assert "(step 4 of 4)" in outcome.out
     derainer = Derainer("model.onnx")
     spec = derainer.spec
     # The student sees what its start saw.
@@ -143,7 +143,7 @@ def test_a_folder_of_something_else_is_not_cleared(refused, recording: Path) -> 
     ("scans", "options", "names"),
     [
         (2, (), "2 scans: too few to learn from some and choose by others"),
-        (3, ("--teacher", "nobody"), "derain: nobody: no such file"),
+        (3, ("--teacher", "nobody"), "derain: nobody: no such method or file"),
         (3, ("--poses", "none.txt", "--teacher", "dror"), "none.txt"),
     ],
 )

@@ -169,7 +169,9 @@ def test_the_scans_are_drawn_by_the_seed(succeed) -> None:
 
 
 def test_a_slip_of_the_pen_is_known(refused) -> None:
-    assert "dzor: no such file. Did you mean dsor?" in refused("tune", "dzor", *DATA, "--out", BEST)
+    assert "dzor: no such method or file. Did you mean dsor?" in refused(
+        "tune", "dzor", *DATA, "--out", BEST
+    )
 
 
 def test_scans_without_rain_are_refused(refused, write_labelled) -> None:
