@@ -7,11 +7,12 @@ from contextlib import contextmanager
 from derain.cli.options import count
 from derain.errors import InputError
 from derain.jobs.running import Submits
-from derain.jobs.shard import Shard
+from derain.jobs.shard import TASK, Shard
 from derain.jobs.workers import WorkerPool
 from derain.sources.units import BLOCK, Division
 from derain.system.cores import threads_of
 from derain.system.memory import total_memory
+from derain.system.notices import warn
 
 # A worker has at least so many units where there are several workers unasked: none waits for long.
 UNITS_OF_WORKER = 4
@@ -75,6 +76,10 @@ def division_of(arguments: argparse.Namespace) -> Division:
         InputError: Options that exclude each other.
     """
     of_shard = arguments.shard or Shard.of_environment()
+    if of_shard is not None and of_shard.of_array:
+        warn(
+            f"{TASK} is {of_shard.number + of_shard.first}: one share is done; --shard 0/1 does all"
+        )
     if arguments.anew and of_shard is not None:
         raise InputError(
             "--anew", "excludes shares of the work", "Give --out another folder instead."

@@ -131,7 +131,8 @@ def clean(
             job = _job(source, work, opened, division)
             units = units_of(source, method, division.block)
             job.list_units(units)
-            units = units if division.shard is None else division.shard.of(units)
+            if division.shard is not None:
+                units = division.shard.within(job.shards).of(units)
             outcomes = _counted(run(Task(job, work), units, executor), opened)
         else:
             units = [whole(source)]
