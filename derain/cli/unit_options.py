@@ -8,28 +8,19 @@ from derain.cli.options import count
 from derain.errors import InputError
 from derain.jobs.running import Submits
 from derain.jobs.shard import Shard
-from derain.jobs.workers import WorkerPool
+from derain.jobs.workers import processes
 from derain.sources.units import BLOCK, Division
 from derain.system.cores import threads_of
 
+# What --workers stands for, in its help.
+SHARING_THREADS = "processes, which share the threads (default: 1)"
+
 
 def add_units(parser: argparse.ArgumentParser) -> None:
-    """Declares the options."""
+    """Declares the options of commands that judge many scans."""
     group = parser.add_argument_group("many scans")
-    group.add_argument(
-        "--workers", type=count, metavar="N", help="processes, which share the threads (default: 1)"
-    )
-    group.add_argument(
-        "--dask",
-        metavar="ADDRESS",
-        help="workers of a Dask cluster: address of its scheduler, or the scheduler's file",
-    )
-    group.add_argument(
-        "--shard",
-        type=shard,
-        metavar="I/N",
-        help="do share I of N, from 0 on (default: by SLURM_ARRAY_TASK_ID, where there is one)",
-    )
+    add_executor(group, SHARING_THREADS)
+    add_shard(group)
     group.add_argument(
         "--resume",
         action="store_true",
@@ -48,6 +39,31 @@ def add_units(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_executor(group: "argparse._ArgumentGroup", workers: str) -> None:
+    """Declares the options of :func:`executor_of`.
+
+    Args:
+        group: Where they are declared.
+        workers: Help of ``--workers``.
+    """
+    group.add_argument("--workers", type=count, metavar="N", help=workers)
+    group.add_argument(
+        "--dask",
+        metavar="ADDRESS",
+        help="workers of a Dask cluster: address of its scheduler, or the scheduler's file",
+    )
+
+
+def add_shard(group: "argparse._ArgumentGroup") -> None:
+    """Declares the option of :func:`shard_of`."""
+    group.add_argument(
+        "--shard",
+        type=shard,
+        metavar="I/N",
+        help="do share I of N, from 0 on (default: by SLURM_ARRAY_TASK_ID, where there is one)",
+    )
+
+
 def shard(text: str) -> Shard:
     """A share of the units."""
     try:
@@ -58,13 +74,19 @@ def shard(text: str) -> Shard:
         raise argparse.ArgumentTypeError(str(error)) from error
 
 
+def shard_of(arguments: argparse.Namespace) -> Shard | None:
+    """The share of the work that is done; None for all of it."""
+    of_arguments: Shard | None = arguments.shard
+    return of_arguments or Shard.of_environment()
+
+
 def division_of(arguments: argparse.Namespace) -> Division:
     """How the arguments divide the work.
 
     Raises:
         InputError: Options that exclude each other.
     """
-    of_shard = arguments.shard or Shard.of_environment()
+    of_shard = shard_of(arguments)
     if arguments.anew and of_shard is not None:
         raise InputError(
             "--anew", "excludes shares of the work", "Give --out another folder instead."
@@ -81,8 +103,12 @@ def threads_of_each(arguments: argparse.Namespace) -> int:
 
 
 @contextmanager
-def executor_of(arguments: argparse.Namespace) -> Iterator[Submits | None]:
+def executor_of(arguments: argparse.Namespace, workers: int = 1) -> Iterator[Submits | None]:
     """Lends the processes that the arguments name; None where this process does the work.
+
+    Args:
+        arguments: The arguments.
+        workers: Processes where none are named.
 
     Raises:
         InputError: Options that exclude each other, or a cluster that cannot do the work.
@@ -92,10 +118,8 @@ def executor_of(arguments: argparse.Namespace) -> Iterator[Submits | None]:
             raise InputError("--workers", "excludes --dask", "Leave one of them out.")
         from derain.jobs.cluster import dask_executor  # imports Dask
 
-        with dask_executor(arguments.dask) as executor:
-            yield executor
-    elif (arguments.workers or 1) > 1:
-        with WorkerPool(arguments.workers) as pool:
-            yield pool
+        with dask_executor(arguments.dask) as cluster:
+            yield cluster
     else:
-        yield None
+        with processes(arguments.workers or workers) as pool:
+            yield pool

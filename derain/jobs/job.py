@@ -151,20 +151,27 @@ class Job:
 
     def _refuse_other(self, begun: "Job") -> None:
         """Refuses to go on with a job that was begun by other options."""
-        names = [*begun.options, *(name for name in self.options if name not in begun.options)]
-        changed = [name for name in names if begun.options.get(name) != self.options.get(name)]
-        if not changed:
-            return
-        differences = ", ".join(
-            f"{name} was {begun.options.get(name, 'not there')} and is "
-            f"{self.options.get(name, 'not there')}"
-            for name in changed
-        )
-        raise InputError(
-            self.folder,
-            f"was begun by other options: {differences}",
-            "Give --out another folder, or --anew to have all of it done again.",
-        )
+        if changed := differences(begun.options, self.options):
+            raise InputError(
+                self.folder,
+                f"was begun by other options: {changed}",
+                "Give --out another folder, or --anew to have all of it done again.",
+            )
+
+
+def differences(begun: Mapping[str, Any], now: Mapping[str, Any]) -> str:
+    """Names the options that were others where something began; empty where none was.
+
+    Args:
+        begun: The options by which it began.
+        now: Those of now.
+    """
+    names = [*begun, *(name for name in now if name not in begun)]
+    return ", ".join(
+        f"{name} was {begun.get(name, 'not there')} and is {now.get(name, 'not there')}"
+        for name in names
+        if begun.get(name) != now.get(name)
+    )
 
 
 def _write(path: Path, content: Any) -> None:

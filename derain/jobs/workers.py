@@ -3,8 +3,9 @@
 import multiprocessing
 import pickle
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from multiprocessing.connection import Connection
 from queue import SimpleQueue
 from typing import Any, ParamSpec, Self, TypeVar
@@ -17,6 +18,20 @@ TRIES = 3
 
 Given = ParamSpec("Given")
 Result = TypeVar("Result")
+
+
+@contextmanager
+def processes(count: int) -> Iterator["WorkerPool | None"]:
+    """Lends processes of this machine as an executor; None for one, which is this process.
+
+    Args:
+        count: How many.
+    """
+    if count == 1:
+        yield None
+    else:
+        with WorkerPool(count) as pool:
+            yield pool
 
 
 class WorkerPool(ThreadPoolExecutor):
