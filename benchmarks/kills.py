@@ -38,6 +38,7 @@ from benchmarks.small_inputs import COMMANDS, SmallInputs
 from benchmarks.whole_files import fault_of
 from derain.cli.signals import interrupting
 from derain.evaluation.text_tables import markdown_table
+from derain.jobs.job import FOLDER as RECORDS
 
 # Seconds that what a command began may take to notice that it is gone: a data loader of torch's
 # looks every five.
@@ -200,7 +201,11 @@ def _of_session(session: int) -> dict[int, str]:
 
 def temporary_files(victim: Victim, folder: Path) -> list[Path]:
     """What lies about that is nobody's result, and that is not left undisturbed as well."""
-    hidden = [path for path in (folder / "out").rglob(".*") if path.parent.name[0] != "."]
+    hidden = [
+        path
+        for path in (folder / "out").rglob(".*")
+        if path.parent.name[0] != "." and path.name != RECORDS
+    ]
     usual = {path.name for path in (victim.folder / "tmp").iterdir()}
     return [*hidden, *(path for path in (folder / "tmp").iterdir() if path.name not in usual)]
 

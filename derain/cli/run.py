@@ -63,7 +63,7 @@ from derain.cli.options import (
 )
 from derain.cli.outputs import exit_code, noting_progress, print_error, print_facts, print_lines
 from derain.cli.parser import Parser
-from derain.cli.unit_options import add_units, division_of, executor_of, threads_of_each
+from derain.cli.unit_options import add_units, division_of, executor_of, workers_of
 from derain.cli.weather_options import (
     add_weather,
     warn_of_bad_weather,
@@ -82,6 +82,8 @@ from derain.sources.cleaning import CleaningObserver, CleanReport, clean
 from derain.sources.folders import named_frames
 from derain.sources.method import Method
 from derain.sources.recordings import irregularities
+from derain.sources.units import spans_of
+from derain.system.cores import threads_of
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
 from derain.views.scan_issues import MOST_RAIN, ScanIssue
@@ -155,17 +157,18 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     keep_freed_memory()
     name, scans = method_and_scans(arguments.method, arguments.scans or [])
-    arguments.threads = threads_of_each(arguments)
-    method = method_of(name, arguments)
     frames = named_frames(within(scans, arguments.topic), arguments.columns)
     source = placed(frames, arguments.poses, arguments.threads).map(
         lambda frame: frame.with_intensity_times(arguments.intensity_scale)
     )
+    alone = method_of(name, arguments)
     if arguments.probability:
-        require_probabilities(method, source)
-    # What does without the scans around each need not be warned of scans that have none.
-    needed = method.window
-    method = _over_recording(method, arguments, len(source))
+        require_probabilities(alone, source)
+    method = _over_recording(alone, arguments, len(source))
+    workers = workers_of(arguments, lambda: len(spans_of(source, method, arguments.block)))
+    if workers > 1:
+        arguments.threads = max(threads_of(arguments.threads) // workers, 1)
+        method = _over_recording(method_of(name, arguments), arguments, len(source))
     weather = weather_options(arguments)
     sink = CleanSink(
         arguments.out,
@@ -178,12 +181,13 @@ def main(arguments: argparse.Namespace) -> int:
         sink,
         weather_table(arguments.weather) as rows,
         noting_progress(sink.so_far),
-        executor_of(arguments) as executor,
+        executor_of(arguments, workers) as executor,
     ):
         printer = _Printer(arguments.out, rows, arguments.json)
         if name == DEFAULT:
             printer.introduce_default()
-        for sentence in irregularities(source, needed):
+        # What does without the scans around each need not be warned of scans that have none.
+        for sentence in irregularities(source, alone.window):
             warn(sentence)
         report = clean(
             source,

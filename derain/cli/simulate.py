@@ -189,7 +189,7 @@ def main(arguments: argparse.Namespace) -> int:
         if getattr(arguments, name) is None:
             setattr(arguments, name, value)
     campaign = _world_campaign(arguments) if in_world else _campaign(arguments)
-    with executor_of(arguments, usable_cores()) as executor:
+    with executor_of(arguments, arguments.workers or usable_cores()) as executor:
         missing = simulate_track(arguments.out, campaign, executor, shard_of(arguments))
     sequences = len(campaign.names)
     scans = sequences * (1 if in_world else arguments.scans)

@@ -1,7 +1,7 @@
 """Options of commands that divide their work into units: processes, machines, and records."""
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from derain.cli.options import count
@@ -11,15 +11,21 @@ from derain.jobs.shard import Shard
 from derain.jobs.workers import processes
 from derain.sources.units import BLOCK, Division
 from derain.system.cores import threads_of
+from derain.system.memory import total_memory
 
-# What --workers stands for, in its help.
-SHARING_THREADS = "processes, which share the threads (default: 1)"
+# A worker has at least so many units where there are several workers unasked: none waits for long.
+UNITS_OF_WORKER = 4
+
+# Bytes that a worker may take: scans of a million points take .8 GB.
+MEMORY_OF_WORKER = 2 * 10**9
 
 
 def add_units(parser: argparse.ArgumentParser) -> None:
     """Declares the options of commands that judge many scans."""
     group = parser.add_argument_group("many scans")
-    add_executor(group, SHARING_THREADS)
+    add_executor(
+        group, "processes, which share the threads (default: one per thread for many scans, else 1)"
+    )
     add_shard(group)
     group.add_argument(
         "--resume",
@@ -95,20 +101,33 @@ def division_of(arguments: argparse.Namespace) -> Division:
     return Division(arguments.block, of_shard, resume, arguments.anew)
 
 
-def threads_of_each(arguments: argparse.Namespace) -> int:
-    """Threads of each process, which share those of the command; 0 stands for every core."""
-    if arguments.dask is not None:
-        return int(arguments.threads or 1)  # a worker of Dask does a unit in each of its threads
-    return max(threads_of(arguments.threads) // (arguments.workers or 1), 1)
+def workers_of(arguments: argparse.Namespace, count_units: Callable[[], int]) -> int:
+    """The number of processes.
+
+    Unless it is named, there are as many as threads where each has several units to do: they are
+    faster then, also on two cores (BENCHMARK.md). Otherwise there is one, as in a share of the
+    work, of which a batch system may start several on a machine.
+
+    Args:
+        arguments: The options.
+        count_units: Counts the units.
+    """
+    if arguments.workers is not None:
+        return int(arguments.workers)
+    if arguments.dask is not None or shard_of(arguments) is not None:
+        return 1
+    cores = threads_of(arguments.threads)
+    fitting = min(cores, total_memory() // MEMORY_OF_WORKER)
+    return fitting if fitting > 1 and count_units() >= UNITS_OF_WORKER * fitting else 1
 
 
 @contextmanager
-def executor_of(arguments: argparse.Namespace, workers: int = 1) -> Iterator[Submits | None]:
-    """Lends the processes that the arguments name; None where this process does the work.
+def executor_of(arguments: argparse.Namespace, workers: int) -> Iterator[Submits | None]:
+    """Lends the processes that do the work; None where this process does it.
 
     Args:
-        arguments: The arguments.
-        workers: Processes where none are named.
+        arguments: The options.
+        workers: Number of processes of this machine.
 
     Raises:
         InputError: Options that exclude each other, or a cluster that cannot do the work.
@@ -121,5 +140,5 @@ def executor_of(arguments: argparse.Namespace, workers: int = 1) -> Iterator[Sub
         with dask_executor(arguments.dask) as cluster:
             yield cluster
     else:
-        with processes(arguments.workers or workers) as pool:
+        with processes(workers) as pool:
             yield pool

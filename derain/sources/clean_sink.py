@@ -109,7 +109,11 @@ class CleanSink:
         scan = _with_probability(frame, judgement) if self.probability else judgement.scan
         removed = None if self._files.removed is None else scan.take(rain)
         self._files.write(frame, scan.take(~rain), rain, removed)
-        self._written += 1
+        self.count(frame)
+
+    def count(self, frame: Frame) -> None:
+        """Counts a scan that is written, by this sink or by one of its :attr:`for_scans`."""
+        self._written += not self._bags.takes(frame)
 
     def so_far(self) -> str:
         """Number of scans in files, and of bags, that are written."""

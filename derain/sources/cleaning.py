@@ -132,7 +132,7 @@ def clean(
             units = units_of(source, method, division.block)
             job.list_units(units)
             units = units if division.shard is None else division.shard.of(units)
-            outcomes = run(Task(job, work), units, executor)
+            outcomes = _counted(run(Task(job, work), units, executor), opened)
         else:
             units = [whole(source)]
             outcomes = _at_once(units[0], work, opened, observer)
@@ -162,6 +162,16 @@ def _at_once(
     """Cleans scan after scan, without records."""
     for outcome in work.clean(unit, sink, observer.judged):
         yield UnitResult(unit, outcome, before=False)
+
+
+def _counted(
+    results: Iterator[UnitResult[FrameUnit, ScanOutcome]], sink: CleanSink
+) -> Iterator[UnitResult[FrameUnit, ScanOutcome]]:
+    """The same, whose written scans a sink counts that does not write them itself."""
+    for result in results:
+        if result.result.error is None:
+            sink.count(result.result.frame)
+        yield result
 
 
 def _keeps_records(source: Source, division: Division, folder: Path) -> bool:

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterable, Iterator
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -67,12 +68,13 @@ class FolderSink:
                 f"--removed is the folder of {self.option}, where the cleaned scans go",
                 "Give it another one.",
             )
+        _real_folder.cache_clear()
         written: dict[str, Frame] = {}
         for frame in source:
             if isinstance(frame, FileFrame):
                 self._refuse_own_files(frame)
             target = self.path(frame, LABEL)
-            other = written.setdefault(os.path.realpath(target), frame)
+            other = written.setdefault(_real(target), frame)
             if other is not frame and not (self.again and _is_one_file(other, frame)):
                 raise InputError(
                     frame.name,
@@ -150,7 +152,20 @@ class LabelSink(FolderSink):
 
 def _is_same(one: Path, other: Path) -> bool:
     """Whether two paths are of one file or folder, whatever they are written like."""
-    return os.path.realpath(one) == os.path.realpath(other)
+    return _real(one) == _real(other)
+
+
+def _real(path: Path) -> str:
+    """The path of a file or folder without symbolic links."""
+    folder, name = os.path.split(path)
+    real = os.path.join(_real_folder(folder), name)
+    return os.path.realpath(path) if name in ("", "..") or os.path.islink(real) else real
+
+
+@lru_cache(maxsize=1024)
+def _real_folder(folder: str) -> str:
+    """The path of a folder without symbolic links; a hundred thousand scans may lie in one."""
+    return os.path.realpath(folder)
 
 
 def _is_one_file(one: Frame, other: Frame) -> bool:

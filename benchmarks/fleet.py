@@ -1,0 +1,274 @@
+"""Cleans a source in every way that there is, compares the bytes, and kills what does it.
+
+    python -m benchmarks.fleet drive/ --method default --block 4
+    python -m benchmarks.fleet world/ --method default --kills 30 --seed 0
+
+The ways are one process, two workers of one thread, four shares one after the other, and a Dask
+scheduler with three workers. Prints seconds of each, from the start of the command to its end, and
+whether its results are those of one process, byte for byte.
+
+With `--kills`, it kills a worker, the Dask scheduler, the client, or a share at a random moment of
+its way's time, and runs the same command until it succeeds. Then the bytes must be the same, each
+unit must have one record, and nothing half-written may lie about. Ends with 1 where anything fell
+short. Linux only.
+"""
+
+import argparse
+import hashlib
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.installed import DERAIN
+from derain.evaluation.text_tables import markdown_table
+
+ADDRESS = "tcp://127.0.0.1:8797"
+SHARES, DASK_WORKERS = 4, 3
+
+# A command that is killed is run again at most so often; a client may well need to see first that
+# its scheduler is gone.
+MOST_RUNS = 5
+
+
+@dataclass(frozen=True)
+class Run:
+    """What is cleaned, and how.
+
+    Attributes:
+        source: The scans.
+        method: The method.
+        options: Further options of ``derain run``.
+        root: Where results go.
+    """
+
+    source: Sequence[Path]
+    method: str
+    options: Sequence[str]
+    root: Path
+
+    def command(self, out: Path, *options: str) -> list[str]:
+        """The command line."""
+        named = [DERAIN, "run", self.method, *self.source, "--out", out, *self.options, *options]
+        return list(map(str, named))
+
+
+def started(command: Sequence[str]) -> subprocess.Popen[bytes]:
+    """Starts a command in a session of its own, with no more than one thread a library."""
+    return subprocess.Popen(
+        command,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, "OMP_NUM_THREADS": "1"},
+        start_new_session=True,
+    )
+
+
+@contextmanager
+def cluster(folder: Path) -> Iterator[list[subprocess.Popen[bytes]]]:
+    """Lends a Dask scheduler, then its workers."""
+    dask = str(DERAIN.with_name("dask"))
+    port = ADDRESS.rpartition(":")[2]
+    processes = [started([dask, "scheduler", "--port", port, "--no-dashboard"])]
+    for number in range(DASK_WORKERS):
+        place = str(folder / f"dask {number}")
+        options = ["--nthreads", "1", "--no-dashboard", "--local-directory", place]
+        processes.append(started([dask, "worker", ADDRESS, *options]))
+    try:
+        yield processes
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+            end_session(process.pid)
+
+
+def one_process(run: Run, out: Path) -> None:
+    """Cleans as `derain run` does by itself, with every thread."""
+    subprocess.run(run.command(out), check=True, capture_output=True)
+
+
+def two_workers(run: Run, out: Path) -> None:
+    """Cleans by two processes."""
+    subprocess.run(run.command(out, "--workers", "2"), check=True, capture_output=True)
+
+
+def four_shares(run: Run, out: Path) -> None:
+    """Cleans in four shares, one after the other."""
+    for number in range(SHARES):
+        share = f"{number}/{SHARES}"
+        subprocess.run(run.command(out, "--shard", share), check=True, capture_output=True)
+
+
+def dask(run: Run, out: Path) -> None:
+    """Cleans by three workers of a Dask cluster that is there."""
+    subprocess.run(run.command(out, "--dask", ADDRESS), check=True, capture_output=True)
+
+
+OF_DASK = ("a worker of Dask", "the scheduler", "the client of Dask")
+VICTIMS = ("a worker", "the client", "a share", *OF_DASK)
+
+WAYS: dict[str, Callable[[Run, Path], None]] = {
+    "one process": one_process,
+    "two workers": two_workers,
+    "four shares": four_shares,
+    "Dask, three workers": dask,
+}
+
+
+def main() -> int:
+    """Compares, kills and prints."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("source", nargs="+", type=Path)
+    parser.add_argument("--method", default="default")
+    parser.add_argument("--block", type=int, default=50)
+    parser.add_argument("--alone", action="store_true")
+    parser.add_argument("--kills", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--ways", nargs="+", choices=WAYS, default=list(WAYS))
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        options = ["--block", str(arguments.block), *(["--alone"] if arguments.alone else [])]
+        source = [path.absolute() for path in arguments.source]
+        run = Run(source, arguments.method, options, Path(name))
+        with cluster(run.root):
+            time.sleep(5)  # for its workers
+            seconds, sums = compared(run, arguments.ways)
+        wanted = sums["one process"]
+        rows = [
+            [way, f"{seconds[way]:.1f}", "the same" if sums[way] == wanted else "OTHER"]
+            for way in arguments.ways
+        ]
+        print(markdown_table(("way", "seconds", "bytes"), rows), flush=True)
+        faults = len(set(sums.values())) - 1
+        if arguments.kills:
+            faults += kill_again_and_again(run, arguments, seconds, wanted)
+    return int(faults > 0)
+
+
+def compared(run: Run, ways: Sequence[str]) -> tuple[dict[str, float], dict[str, str]]:
+    """Seconds of each way, and the checksum of its results."""
+    seconds, sums = {}, {}
+    for way in ways:
+        out = run.root / way
+        begun = time.monotonic()
+        WAYS[way](run, out)
+        seconds[way], sums[way] = time.monotonic() - begun, checksum(out)
+    return seconds, sums
+
+
+def kill_again_and_again(
+    run: Run, arguments: argparse.Namespace, seconds: dict[str, float], wanted: str
+) -> int:
+    """Kills one victim after the other, prints a table, and returns how much fell short."""
+    generator, faults = random.Random(arguments.seed), 0
+    kills, runs = Counter[str](), Counter[str]()
+    for number in range(arguments.kills):
+        victim, out = VICTIMS[number % len(VICTIMS)], run.root / f"kill {number}"
+        kill_once(run, victim, out, seconds, generator)
+        kills[victim] += 1
+        again = run.command(out, "--workers", "2")
+        for _ in range(MOST_RUNS):
+            runs[victim] += 1
+            if subprocess.run(again, capture_output=True).returncode == 0:
+                break
+        for fault in short_of(out, wanted):
+            faults += 1
+            print(f"kill {number}, {victim}: {fault}", file=sys.stderr, flush=True)
+        shutil.rmtree(out)
+    rows = [[victim, str(kills[victim]), str(runs[victim])] for victim in kills]
+    print(markdown_table(("killed", "times", "runs until done"), rows))
+    print(f"{faults} fell short")
+    return faults
+
+
+def kill_once(
+    run: Run, victim: str, out: Path, seconds: dict[str, float], generator: random.Random
+) -> None:
+    """Starts a run, kills its victim at a random moment, and waits for the end of the run."""
+    with cluster(run.root) if victim in OF_DASK else nullcontext([]) as processes:
+        if victim == "a share":
+            way, options, part = "four shares", ("--shard", f"1/{SHARES}"), SHARES
+        elif victim in OF_DASK:
+            time.sleep(5)  # for its workers
+            way, options, part = "Dask, three workers", ("--dask", ADDRESS), 1
+        else:
+            way, options, part = "two workers", ("--workers", "2"), 1
+        client = started(run.command(out, *options))
+        time.sleep(generator.uniform(0, seconds[way] / part))
+        if victim == "the scheduler":
+            processes[0].kill()
+        elif victim == "a worker of Dask":
+            processes[generator.randrange(1, len(processes))].kill()
+        elif victim == "a worker":
+            if others := sorted(of_session(client.pid) - {client.pid}):  # none, at first
+                os.kill(generator.choice(others), signal.SIGKILL)
+        else:
+            client.kill()
+        try:
+            client.wait(3 * seconds[way] + 60)
+        except subprocess.TimeoutExpired:
+            print(f"{victim}: the client goes on for ever", file=sys.stderr)
+            client.kill()
+        end_session(client.pid)
+
+
+def short_of(out: Path, wanted: str) -> Iterator[str]:
+    """What is wrong with results that should be complete."""
+    if checksum(out) != wanted:
+        yield "its results are others than those of one process"
+    units = [unit for unit, *_ in json.loads((out / ".derain/units.json").read_bytes())]
+    records = Path(out / ".derain/units").rglob("*.json")
+    found = Counter(json.loads(record.read_bytes())["unit"] for record in records)
+    if found != Counter(units):
+        yield f"{len(units)} units and {found.total()} records"
+    if left := [path for path in out.rglob(".derain-*") if path.exists()]:
+        yield f"left lying about: {left[0]}"
+
+
+def checksum(out: Path) -> str:
+    """Of all results by their paths, without records."""
+    digest = hashlib.sha256()
+    for path in sorted(out.rglob("*")):
+        if path.is_file() and ".derain" not in path.parts:
+            digest.update(str(path.relative_to(out)).encode() + path.read_bytes())
+    return digest.hexdigest()
+
+
+def of_session(session: int) -> set[int]:
+    """Processes of a session."""
+    found = set()
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            fields = (folder / "stat").read_text().rpartition(") ")[2].split()
+            if int(fields[3]) == session and fields[0] != "Z":
+                found.add(int(folder.name))
+        except OSError:
+            continue  # it ended meanwhile
+    return found
+
+
+def end_session(session: int) -> None:
+    """Waits a moment for the other processes of a session, then kills them."""
+    for _ in range(20):
+        if not of_session(session):
+            return
+        time.sleep(0.2)
+    for process in of_session(session):
+        os.kill(process, signal.SIGKILL)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
