@@ -14,6 +14,7 @@ from derain.errors import InputError
 from derain.evaluation.answers import NOT_KNOWN, RAIN, Answers, AnswersOfScan, answer_of
 from derain.evaluation.counts import SCORES
 from derain.evaluation.text_tables import markdown_table, number_text
+from derain.evaluation.truth_record import TruthRecord
 from derain.pictures.answers import answers_figure
 from derain.pictures.scan_pictures import before_after_figure, save
 from derain.scan import Scan
@@ -23,7 +24,6 @@ from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
 from derain.sources.spread import evenly_spaced
 from derain.workflows.learn_report import LearnResults
-from derain.workflows.teaching import TruthRecord
 
 # Returns which points of a scan of N points are rain, bool (N,).
 Student = Callable[[Scan], NDArray[np.bool_]]
