@@ -26,7 +26,7 @@ from derain.errors import InputError
 from derain.files.atomic import replacing
 from derain.files.labels import LABEL
 from derain.jobs.job import FOLDER, Job
-from derain.jobs.running import Submits, Task, run
+from derain.jobs.running import Submits, Task, completed, run
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
 from derain.sources.judging import Guard, unguarded
@@ -120,13 +120,8 @@ def _by_units(
     frames = _known(results, sum(len(unit.frames) for unit in share), guard, watch)
     if division.shard is None:
         return frames
-    of_all: list[Frame] = []
-    for unit in units:
-        done = task.done(unit)
-        if done is None:
-            return None
-        of_all += [scan.frame for scan in done if scan.is_known]
-    return of_all
+    scans = completed(task, units)
+    return None if scans is None else [scan.frame for scan in scans if scan.is_known]
 
 
 def _known(scans: Iterator[LabelledScan], total: int, guard: Guard, watch: Watch) -> list[Frame]:

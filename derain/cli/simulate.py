@@ -190,14 +190,14 @@ def main(arguments: argparse.Namespace) -> int:
             setattr(arguments, name, value)
     campaign = _world_campaign(arguments) if in_world else _campaign(arguments)
     with executor_of(arguments, arguments.workers or usable_cores()) as executor:
-        missing = simulate_track(arguments.out, campaign, executor, shard_of(arguments))
+        complete = simulate_track(arguments.out, campaign, executor, shard_of(arguments))
+    if not complete:
+        print_lines(f"How far the other shares are: derain status {arguments.out}")
+        return 0
     sequences = len(campaign.names)
     scans = sequences * (1 if in_world else arguments.scans)
     print_lines(
-        f"{arguments.out}: {sequences - missing} of {sequences} sequences. "
-        f"How far the other shares are: derain status {arguments.out}"
-        if missing
-        else f"{arguments.out}: {sequences} sequences, {scans:,} scans. "
+        f"{arguments.out}: {sequences} sequences, {scans:,} scans. "
         f"What is in them: derain info {arguments.out}"
     )
     return 0

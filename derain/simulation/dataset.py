@@ -24,7 +24,7 @@ from tqdm import tqdm
 from derain.errors import InputError
 from derain.files.atomic import lock, remove_abandoned, temporary_folder, writing
 from derain.jobs.job import FOLDER, Job, differences
-from derain.jobs.running import Submits, Task, Work, run
+from derain.jobs.running import Submits, Task, Work, completed, run
 from derain.jobs.shard import Shard
 from derain.jobs.unit import Unit
 from derain.simulation.campaign import SplitSequences
@@ -66,7 +66,7 @@ def simulate_track(
     campaign: SplitSequences,
     executor: Submits | None = None,
     shard: Shard | None = None,
-) -> int:
+) -> bool:
     """Simulates a data set, or what is missing of it.
 
     Args:
@@ -77,7 +77,7 @@ def simulate_track(
             share completes the manifest.
 
     Returns:
-        Number of the sequences that other shares have yet to simulate.
+        Whether the data set is complete; False while other shares are to be simulated.
 
     Raises:
         InputError: The folder holds something else or cannot be written, Open3D cannot be imported,
@@ -94,7 +94,7 @@ def _simulate(
     shard: Shard | None,
     *,
     keep: bool,
-) -> int:
+) -> bool:
     """Simulates the sequences that are missing; see :func:`simulate_track`.
 
     Args:
@@ -112,7 +112,7 @@ def _simulate(
         there = read_manifest(root)
         _refuse_others(root, there, campaign)
         if "files" in there and all((root / SEQUENCES / name).is_dir() for name in campaign.names):
-            return 0
+            return True
         import_open3d()  # raises where it is missing, before anything is written
         # The manifest comes first: a folder with content but without one is refused.
         if there != description:
@@ -124,7 +124,15 @@ def _simulate(
         job.list_units(units)
         task = Task(job, work)
         _run(task, units if shard is None else shard.of(units), executor)
-        return _complete(root, task, units, description)
+        outcomes = completed(task, units)
+        if outcomes is None:
+            return False
+        files: dict[str, str] = {}
+        for checksums_of_sequence in outcomes:
+            assert isinstance(checksums_of_sequence, dict)  # none of them failed
+            files |= checksums_of_sequence
+        write_manifest(root, {**description, "files": files})
+        return True
 
 
 def _run(task: Task[Unit, Outcome], units: Sequence[Unit], executor: Submits | None) -> None:
@@ -147,27 +155,6 @@ def _run(task: Task[Unit, Outcome], units: Sequence[Unit], executor: Submits | N
             "not be simulated",
             f"{failures[0].remedy} The same command goes on with them.",
         )
-
-
-def _complete(
-    root: Path, task: Task[Unit, Outcome], units: Sequence[Unit], description: Mapping[str, Any]
-) -> int:
-    """Writes the manifest with the checksums, if all sequences are there.
-
-    Returns:
-        Number of those that are missing.
-    """
-    files: dict[str, str] = {}
-    missing = 0
-    for unit in units:
-        done = task.done(unit)
-        missing += done is None
-        for checksums_of_one in done or ():
-            assert isinstance(checksums_of_one, dict)
-            files |= checksums_of_one
-    if not missing:
-        write_manifest(root, {**description, "files": files})
-    return missing
 
 
 @dataclass(frozen=True)

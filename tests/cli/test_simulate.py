@@ -73,7 +73,7 @@ def test_shares_are_counted_by_the_status(
 ) -> None:
     root = tmp_path / "worlds"
     command = ("simulate", "--out", root, "--world", "--sequences", "3", "--workers", "1")
-    assert f"{root}: 1 of 3 sequences" in succeed(*command, "--shard", "1/2").out
+    assert f"derain status {root}" in succeed(*command, "--shard", "1/2").out
     outcome = run_derain("status", root)
     assert outcome.code == 2
     lines = outcome.out.splitlines()
