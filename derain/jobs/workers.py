@@ -3,7 +3,7 @@
 import multiprocessing
 import pickle
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
@@ -18,6 +18,7 @@ from derain.system.workers import end_with_parent, without_main_module
 TRIES = 3
 
 Given = ParamSpec("Given")
+Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
@@ -33,6 +34,23 @@ def processes(count: int) -> Iterator["WorkerPool | None"]:
     else:
         with WorkerPool(count) as pool:
             yield pool
+
+
+def each_by(
+    workers: int, work: Callable[[Item], Result], items: Sequence[Item]
+) -> Iterator[Result]:
+    """Has work done on each item, without records; yields the results in the order of the items.
+
+    Args:
+        workers: Number of processes; one is this process.
+        work: What is done.
+        items: What it is done on.
+
+    Raises:
+        InputError: A process always dies; or what the work raises.
+    """
+    with processes(workers) as pool:
+        yield from map(work, items) if pool is None else pool.map(work, items)
 
 
 class WorkerPool(ThreadPoolExecutor):
