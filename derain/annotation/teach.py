@@ -85,11 +85,12 @@ def teach(
     refuse_to_overwrite(out, source)
     fingerprint = method.fingerprint()
     if division is not None and division.keeps_records(source, out):
+        place = out.absolute()  # other processes may work in another folder
         # The labels of all scans stay there, and are linked to where they belong.
-        work = Labelling(method, fingerprint, out / FOLDER, card)
+        work = Labelling(method, fingerprint, place / FOLDER, card)
         options = work.options("teach", source, division.block)
         options["card"] = None if card is None else card.name
-        task = Task(Job.begin(out, options, division.shard, division.anew), work)
+        task = Task(Job.begin(place, options, division.shard, division.anew), work)
         units = units_of(source, method, division.block)
         task.job.list_units(units)
         frames = _by_units(task, units, division, executor, guard, watch)
