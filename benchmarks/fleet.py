@@ -140,7 +140,8 @@ def main() -> int:
     parser.add_argument("--ways", nargs="+", choices=WAYS, default=list(WAYS))
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
-        options = ["--block", str(arguments.block), *(["--alone"] if arguments.alone else [])]
+        options = ["--block", str(arguments.block), "--most-removed", "1"]
+        options += ["--alone"] if arguments.alone else []
         source = [path.absolute() for path in arguments.source]
         run = Run(source, arguments.method, options, Path(name))
         with cluster(run.root):

@@ -30,8 +30,8 @@ all scans. Write ./crf for a folder called crf.
 The model that comes with derain judges the scans of a recording by the scans around them, too:
 solid things are where they were, rain is not. Where the sensor was comes from the poses, or else
 from the scans; where that is not known, or with --alone, each scan is judged by itself.
-Methods that see several scans need the scans of a recording in time order. Where a method is not
-sure of a point, its best guess decides. Results of a data set are named by their paths in it.
+Methods that see several scans need the scans of a recording in time order. A point of which a
+method is not sure stays. Results of a data set are named by their paths in it.
 A bag (.bag of ROS 1; .mcap, .db3 or a folder of ROS 2) becomes a bag of the same name: the clouds
 of one topic have no rain, and everything else stays the same, byte for byte.
 derain warns once of each fault of the scans. It skips scans with more than --most-removed rain: it
@@ -73,6 +73,7 @@ from derain.cli.weather_options import (
 from derain.default import DEFAULT, model_card
 from derain.errors import InputError
 from derain.example import Truth
+from derain.export.methods import CUES, DELAY, PAST
 from derain.export.runtime import Derainer
 from derain.files.labels import LABEL
 from derain.sources.clean_sink import CleanSink, require_probabilities
@@ -90,9 +91,6 @@ from derain.views.scan_issues import MOST_RAIN, ScanIssue
 from derain.weather.record import weather_row
 from derain.workflows.odometry import placed
 
-# Scans before and after each that a model sees by default, as far as they are of its recording.
-PAST, DELAY = 1, 1
-
 # Options that only --help-all shows.
 RARE = (
     *("--runtime", "--precision", "--parameters", "--columns", "--intensity-scale"),
@@ -100,9 +98,6 @@ RARE = (
     *("--removed-topic", "--keep-shape", "--dry", "--warning", "--error", "--hold"),
     *("--resume", "--anew", "--shard", "--dask", "--block"),
 )
-
-# The network that sees them unasked.
-CUES = "cues"
 
 
 def add_arguments(parser: Parser) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Self
 
 from derain.errors import InputError
+from derain.files.atomic import require_writable_folder
 from derain.files.columns import with_column
 from derain.files.format import format_of
 from derain.scan import Scan
@@ -40,7 +41,7 @@ class CleanSink:
 
     Raises:
         InputError: The folder holds files that must not be overwritten, two scans have one name, or
-            options that contradict each other.
+            options that contradict each other; in the block, a folder that cannot be written.
 
     Attributes:
         folder: Folder to write to.
@@ -79,6 +80,8 @@ class CleanSink:
         self._written = 0
 
     def __enter__(self) -> Self:
+        for folder in filter(None, (self._files.folder, self._files.removed)):
+            require_writable_folder(folder)
         self._bags.__enter__()
         return self
 
@@ -93,7 +96,7 @@ class CleanSink:
         yield from self._bags.targets()
 
     def write(self, judgement: Judgement) -> None:
-        """Writes a scan without its rain; a method's best guess decides where it is not sure.
+        """Writes a scan without its rain.
 
         Args:
             judgement: The scan, judged; scans of a bag come in the order of the bag.
