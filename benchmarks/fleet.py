@@ -94,8 +94,8 @@ def cluster(folder: Path) -> Iterator[list[subprocess.Popen[bytes]]]:
 
 
 def one_process(run: Run, out: Path) -> None:
-    """Cleans as `derain run` does by itself, with every thread."""
-    subprocess.run(run.command(out), check=True, capture_output=True)
+    """Cleans in one process, with every thread."""
+    subprocess.run(run.command(out, "--workers", "1"), check=True, capture_output=True)
 
 
 def two_workers(run: Run, out: Path) -> None:

@@ -105,7 +105,7 @@ def teach(
 
 def _by_units(
     task: Task[FrameUnit, LabelledScan],
-    units: Sequence[FrameUnit],
+    units: list[FrameUnit],
     division: Division,
     executor: Submits | None,
     guard: Guard,
@@ -116,7 +116,7 @@ def _by_units(
     Returns:
         The frames of which something is known; None while other shares are to be done.
     """
-    share = units if division.shard is None else division.shard.of(units)
+    share = task.job.share_of(units, division.shard)
     results = (each.result for each in run(task, share, executor))
     frames = _known(results, sum(len(unit.frames) for unit in share), guard, watch)
     if division.shard is None:

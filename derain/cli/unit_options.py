@@ -7,11 +7,12 @@ from contextlib import contextmanager
 from derain.cli.options import count
 from derain.errors import InputError
 from derain.jobs.running import Submits
-from derain.jobs.shard import Shard
+from derain.jobs.shard import TASK, Shard
 from derain.jobs.workers import processes
 from derain.sources.units import BLOCK, Division
 from derain.system.cores import threads_of
 from derain.system.memory import total_memory
+from derain.system.notices import warn
 
 # A worker has at least so many units where there are several workers unasked: none waits for long.
 UNITS_OF_WORKER = 4
@@ -81,9 +82,11 @@ def shard(text: str) -> Shard:
 
 
 def shard_of(arguments: argparse.Namespace) -> Shard | None:
-    """The share of the work that is done; None for all of it."""
-    of_arguments: Shard | None = arguments.shard
-    return of_arguments or Shard.of_environment()
+    """The share of the work that is done, of which it warns where nobody asked; None for all."""
+    found: Shard | None = arguments.shard or Shard.of_environment()
+    if found is not None and found.of_array:
+        warn(f"{TASK} is {found.number + found.first}: one share is done; --shard 0/1 does all")
+    return found
 
 
 def division_of(arguments: argparse.Namespace) -> Division:
@@ -114,7 +117,7 @@ def workers_of(arguments: argparse.Namespace, count_units: Callable[[], int]) ->
     """
     if arguments.workers is not None:
         return int(arguments.workers)
-    if arguments.dask is not None or shard_of(arguments) is not None:
+    if arguments.dask is not None or arguments.shard or Shard.of_environment():
         return 1
     cores = threads_of(arguments.threads)
     fitting = min(cores, total_memory() // MEMORY_OF_WORKER)

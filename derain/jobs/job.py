@@ -12,7 +12,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 from derain.errors import InputError
 from derain.files.atomic import replacing, temporary_folder, writing
@@ -22,6 +22,8 @@ from derain.jobs.unit import Unit
 
 FOLDER = ".derain"
 JOB, UNITS, RECORDS = "job.json", "units.json", "units"
+
+UnitT = TypeVar("UnitT", bound=Unit)
 
 
 @dataclass(frozen=True)
@@ -105,6 +107,15 @@ class Job:
         """
         listed = [[unit.id, unit.size, unit.inputs] for unit in units]
         _write(self.folder / FOLDER / UNITS, listed)
+
+    def share_of(self, units: list[UnitT], shard: Shard | None) -> list[UnitT]:
+        """The units of a share, in their order.
+
+        Args:
+            units: All units.
+            shard: The share; None for all of them.
+        """
+        return units if shard is None else shard.within(self.shards).of(units)
 
     def listed(self) -> list[Unit]:
         """The units of the last command that went on with it."""

@@ -123,7 +123,7 @@ def _simulate(
         units = [Unit(id=name, size=1, inputs="") for name in campaign.names]
         job.list_units(units)
         task = Task(job, work)
-        _run(task, units if shard is None else shard.of(units), executor)
+        _run(task, job.share_of(units, shard), executor)
         outcomes = completed(task, units)
         if outcomes is None:
             return False

@@ -129,7 +129,7 @@ def clean(
             job = _job(source, work, opened, division)
             units = units_of(source, method, division.block)
             job.list_units(units)
-            units = units if division.shard is None else division.shard.of(units)
+            units = job.share_of(units, division.shard)
             outcomes = _counted(run(Task(job, work), units, executor), opened)
         else:
             units = [whole(source)]
