@@ -10,6 +10,7 @@ import shutil
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, Self, TypeVar
@@ -94,7 +95,7 @@ class Job:
         """Whether a folder has a job."""
         return (folder / FOLDER / JOB).exists()
 
-    @property
+    @cached_property
     def fingerprint(self) -> str:
         """Of its options, 16 hexadecimal digits."""
         return sha256(json.dumps(self.options, sort_keys=True).encode()).hexdigest()[:16]
