@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from hashlib import sha256
 from typing import Any, ClassVar
 from weakref import WeakKeyDictionary
 
@@ -94,7 +95,8 @@ class RecordedDerainer(Method):
 
     def fingerprint(self) -> str:
         """A fingerprint of the model, and of how many scans around one it sees."""
-        return f"{self.model.fingerprint()}-{self.window.before}-{self.window.after}"
+        seen = f"{self.model.fingerprint()} {self.window.before} {self.window.after}"
+        return sha256(seen.encode()).hexdigest()[:16]
 
     @property
     def waiting(self) -> int:

@@ -85,6 +85,7 @@ class Derainer(Method):
         self.name = DEFAULT if of_derain else str(file.path)
         self.threads = threads_of(threads)
         self.metadata, self.spec = file.metadata, file.spec
+        self._checksum = sha256(file.content).hexdigest()
         self.view = self.spec.make_view(self.threads)
         self.session = self.runtime.open(file, self.threads)
         _refuse_other_network(self.session, self.view, self.path)
@@ -173,9 +174,9 @@ class Derainer(Method):
         return self.window
 
     def fingerprint(self) -> str:
-        """A fingerprint of its file, its threshold and its runtime, wherever the file is."""
+        """A fingerprint of its file as it was read, its threshold and its runtime."""
         settings = f"{self.spec.threshold} {self.runtime.name} {self.runtime.precision}"
-        return sha256(self.path.read_bytes() + settings.encode()).hexdigest()[:16]
+        return sha256(f"{self._checksum} {settings}".encode()).hexdigest()[:16]
 
     @property
     def waiting(self) -> int:

@@ -152,6 +152,7 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     keep_freed_memory()
     name, scans = method_and_scans(arguments.method, arguments.scans or [])
+    division = division_of(arguments)
     frames = named_frames(within(scans, arguments.topic), arguments.columns)
     source = placed(frames, arguments.poses, arguments.threads).map(
         lambda frame: frame.with_intensity_times(arguments.intensity_scale)
@@ -161,8 +162,10 @@ def main(arguments: argparse.Namespace) -> int:
         require_probabilities(alone, source)
     method = _over_recording(alone, arguments, len(source))
     workers = workers_of(arguments, lambda: len(spans_of(source, method, arguments.block)))
-    if workers > 1:
-        arguments.threads = max(threads_of(arguments.threads) // workers, 1)
+    if workers > 1 or arguments.dask is not None:
+        # A worker of Dask does a unit in each of its threads.
+        shared = 1 if arguments.dask and not arguments.threads else threads_of(arguments.threads)
+        arguments.threads = max(shared // workers, 1)
         method = _over_recording(method_of(name, arguments), arguments, len(source))
     weather = weather_options(arguments)
     sink = CleanSink(
@@ -191,7 +194,7 @@ def main(arguments: argparse.Namespace) -> int:
             most_removed=arguments.most_removed,
             weather=weather,
             observer=printer,
-            division=division_of(arguments),
+            division=division,
             executor=executor,
         )
         printer.summarise(report)

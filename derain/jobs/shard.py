@@ -1,4 +1,4 @@
-"""One of several equal shares of a job, each done by a command of its own."""
+"""Shards of a job: parts of about the same size, each done by a command of its own."""
 
 import heapq
 import os
@@ -10,16 +10,17 @@ from typing import Self, TypeVar
 from derain.errors import InputError
 from derain.jobs.unit import Unit
 
-# What SLURM gives each task of an array: its number, how many there are, and the first number.
+# What SLURM gives each task of an array: its number, the first number, and the last.
 # Source: sbatch(1), "Output environment variables".
-TASK, TASKS, FIRST_TASK = "SLURM_ARRAY_TASK_ID", "SLURM_ARRAY_TASK_COUNT", "SLURM_ARRAY_TASK_MIN"
+TASK = "SLURM_ARRAY_TASK_ID"
+FIRST_TASK, LAST_TASK = "SLURM_ARRAY_TASK_MIN", "SLURM_ARRAY_TASK_MAX"
 
 UnitT = TypeVar("UnitT", bound=Unit)
 
 
 @dataclass(frozen=True)
 class Shard:
-    """One of several shares.
+    """One of the shards of a job.
 
     Attributes:
         number: Which, from 0.
@@ -28,7 +29,7 @@ class Shard:
         of_array: Whether it is a task of a batch system's array.
 
     Raises:
-        InputError: No such share.
+        InputError: No such shard.
     """
 
     number: int
@@ -38,16 +39,17 @@ class Shard:
 
     def __post_init__(self) -> None:
         if not 0 <= self.number < self.count:
+            last = self.first + self.count - 1
             raise InputError(
-                "--shard",
-                f"there is no share {self.number + self.first} of {self.count}: they are "
-                f"{self.first} to {self.first + self.count - 1}",
-                "Give one of them.",
+                TASK if self.of_array else "--shard",
+                f"there is no shard {self.number + self.first}: the {self.count} shards are "
+                f"{self.first} to {last}",
+                f"Submit --array={self.first}-{last}." if self.of_array else "Give one of them.",
             )
 
     @classmethod
     def of_text(cls, text: str) -> Self:
-        """The share that ``I/N`` names, the first of which is 0/N.
+        """The shard that ``I/N`` names, the first of which is 0/N.
 
         Raises:
             ValueError: Other text.
@@ -59,21 +61,21 @@ class Shard:
 
     @classmethod
     def of_environment(cls, environment: Mapping[str, str] = os.environ) -> Self | None:
-        """The share of this task of a SLURM array; None outside of an array."""
+        """The shard of this task of a SLURM array; None outside of an array."""
         if TASK not in environment:
             return None
+        task = int(environment[TASK])
         first = int(environment.get(FIRST_TASK, "0"))
-        number = int(environment[TASK]) - first
-        count = max(int(environment.get(TASKS, "1")), number + 1)
-        return cls(number, count, first, of_array=True)
+        last = int(environment.get(LAST_TASK, task))
+        return cls(task - first, last - first + 1, first, of_array=True)
 
     def within(self, begun: tuple[int, int] | None) -> Self:
-        """The same task among the shares that a job was begun in.
+        """The same task among the shards that a job was begun in.
 
         A batch system that runs some tasks of an array again counts these alone.
 
         Args:
-            begun: How many shares there were, and what the first was called; None for none.
+            begun: How many shards there were, and what the first was called; None for none.
         """
         if begun is None or not self.of_array:
             return self
@@ -81,23 +83,23 @@ class Shard:
         return replace(self, number=self.number + self.first - first, count=count, first=first)
 
     def of(self, units: Sequence[UnitT]) -> list[UnitT]:
-        """The units of this share, in their order: see :func:`shares`."""
-        number_of = shares(units, self.count)
+        """The units of this shard, in their order: see :func:`shard_numbers`."""
+        number_of = shard_numbers(units, self.count)
         return [unit for unit in units if number_of[unit.id] == self.number]
 
 
-def shares(units: Sequence[Unit], count: int) -> dict[str, int]:
-    """The share of each unit, so that all shares are about as large.
+def shard_numbers(units: Sequence[Unit], count: int) -> dict[str, int]:
+    """The shard of each unit, so that all shards are about as large.
 
-    The largest unit comes first, and each goes to the share that is smallest by then. Only ids and
+    The largest unit comes first, and each goes to the shard that is smallest by then. Only ids and
     sizes matter, and not the order of the units.
 
     Args:
         units: The units.
-        count: How many shares there are.
+        count: How many shards there are.
 
     Returns:
-        Number of the share, from 0, by the id of each unit.
+        Number of the shard, from 0, by the id of each unit.
 
     Source: longest processing time first, R. L. Graham, "Bounds on Multiprocessing Timing
         Anomalies", 1969.

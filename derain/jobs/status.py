@@ -7,7 +7,7 @@ from pathlib import Path
 
 from derain.jobs.job import Job
 from derain.jobs.record import Record
-from derain.jobs.shard import array_expression, shares
+from derain.jobs.shard import array_expression, shard_numbers
 from derain.jobs.unit import Unit
 
 
@@ -33,12 +33,12 @@ class JobStatus:
 
     @property
     def array(self) -> str | None:
-        """The tasks of ``sbatch --array`` with units to do; None without any, or without shares."""
+        """The tasks of ``sbatch --array`` with units to do; None without any, or without shards."""
         to_do = [*(record.unit for record in self.failed), *(unit.id for unit in self.missing)]
         if self.job.shards is None or not to_do:
             return None
         count, first = self.job.shards
-        number_of = shares(self.units, count)
+        number_of = shard_numbers(self.units, count)
         return array_expression([number_of[unit] + first for unit in to_do])
 
 

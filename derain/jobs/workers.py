@@ -3,8 +3,9 @@
 import multiprocessing
 import pickle
 import signal
+import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
 from queue import SimpleQueue
@@ -83,10 +84,11 @@ class WorkerPool(ThreadPoolExecutor):
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        self._ended = kind is not None
-        if self._ended:
+        if kind is not None:
+            self._ended = True
+            self.shutdown(wait=False, cancel_futures=True)
             self._kill()
-        self.shutdown(wait=True, cancel_futures=self._ended)
+        self.shutdown(wait=True)
         self._kill()
 
     def _kill(self) -> None:
@@ -98,18 +100,20 @@ class WorkerPool(ThreadPoolExecutor):
         worker = self._idle.get()
         try:
             for _ in range(TRIES):
+                if self._ended:
+                    raise CancelledError
                 try:
                     succeeded, answer = worker.ask(task)
                 except (EOFError, OSError):
                     worker.kill()
-                    if self._ended:
-                        break
                     continue
                 if succeeded:
                     return answer
                 raise answer
         finally:
             self._idle.put(worker)
+        if self._ended:
+            raise CancelledError
         raise InputError(
             "worker",
             f"its process died {TRIES} times",
@@ -121,6 +125,7 @@ class _Worker:
     """A process that is started with its first work, and again after it died."""
 
     def __init__(self) -> None:
+        self._lock = threading.Lock()  # a pool kills from another thread than it asks from
         self._process: multiprocessing.process.BaseProcess | None = None
         self._connection: Connection[Any, Any] | None = None
 
@@ -137,21 +142,21 @@ class _Worker:
             EOFError: The process died.
             OSError: It died earlier.
         """
-        if self._connection is None:
-            self._start()
-        assert self._connection is not None
-        self._connection.send_bytes(task)
-        answer: tuple[bool, Any] = self._connection.recv()
+        with self._lock:
+            connection = self._connection or self._start()
+        connection.send_bytes(task)
+        answer: tuple[bool, Any] = connection.recv()
         return answer
 
     def kill(self) -> None:
         """Ends the process at once, whatever it does."""
-        if self._process is not None:
-            self._process.kill()
-            self._process.join()
-        self._process = self._connection = None
+        with self._lock:
+            if self._process is not None:
+                self._process.kill()
+                self._process.join()
+            self._process = self._connection = None
 
-    def _start(self) -> None:
+    def _start(self) -> "Connection[Any, Any]":
         # Not forked: a fork has the locks of this process, but not the threads that release them.
         context = multiprocessing.get_context("spawn")
         self._connection, theirs = context.Pipe()
@@ -159,6 +164,7 @@ class _Worker:
         with without_main_module():
             self._process.start()
         theirs.close()  # so that the connection ends with the process
+        return self._connection
 
 
 def _serve(connection: "Connection[Any, Any]") -> None:
@@ -167,10 +173,17 @@ def _serve(connection: "Connection[Any, Any]") -> None:
     end_with_parent()
     keep_freed_memory()
     while True:
-        task = connection.recv_bytes()
+        try:
+            task = connection.recv_bytes()
+        except EOFError:  # the process that asks has ended
+            return
+        answer: tuple[bool, Any]
         try:
             work, given, named = pickle.loads(task)
             answer = True, work(*given, **named)
         except Exception as error:
             answer = False, error
-        connection.send(answer)
+        try:
+            connection.send(answer)
+        except (pickle.PicklingError, TypeError, AttributeError) as error:
+            connection.send((False, TypeError(f"{answer[1]!r} cannot be sent ({error})")))

@@ -1,7 +1,9 @@
 """What a job has cleaned so far: points, rain, and the weather hour by hour."""
 
+import math
 from collections import defaultdict
 from datetime import UTC, datetime
+from pathlib import PurePosixPath
 
 from derain.jobs.record import Record
 from derain.sources.cleaned_scan import counts, unpacked
@@ -20,7 +22,7 @@ class CleanedTotals:
         valid: Number of points that can be judged.
         rain: Number of removed points.
         by_hour: The weather of the measured scans of each hour, by its name: a date and an hour in
-            UTC, or else the hour of the recording.
+            UTC, or else the recording and the hour in it.
     """
 
     def __init__(self) -> None:
@@ -35,7 +37,8 @@ class CleanedTotals:
             self.valid += scan["valid"]
             self.rain += scan["rain"]
             if scan["measured"] is not None:
-                self.by_hour[_hour(scan["seconds"])] += unpacked(scan["measured"])
+                hour = _hour(scan["seconds"], PurePosixPath(record.unit).parent.as_posix())
+                self.by_hour[hour] += unpacked(scan["measured"])
 
     def worst_hours(self, most: int = 3) -> list[tuple[str, ScanWeather]]:
         """The hours with the shortest visibility, the worst first.
@@ -50,9 +53,13 @@ class CleanedTotals:
         return f"{self.scans:,} scans: {counts(self.points, self.valid, self.rain)}"
 
 
-def _hour(seconds: float | None) -> str:
-    if seconds is None:
-        return "without times"
+def _hour(seconds: float | None, recording: str) -> str:
+    """The hour of a time, by its date, or within its recording."""
+    if seconds is None or not math.isfinite(seconds):
+        return f"{recording}, without times"
     if seconds < UNIX_TIMES_FROM:
-        return f"hour {int(seconds // 3600)} of the recording"
-    return datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%d %H:00 UTC")
+        return f"{recording}, hour {int(seconds // 3600)}"
+    try:
+        return datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%d %H:00 UTC")
+    except (OverflowError, ValueError, OSError):  # for instance nanoseconds
+        return f"{recording}, without times in seconds"

@@ -17,7 +17,7 @@ from derain.files.frame_times import METADATA, read_frame_times
 from derain.files.names import scan_stem
 from derain.files.reading import is_file, stamp_of
 from derain.sources.number_lines import read_numbers
-from derain.sources.trajectory import Trajectory, read_trajectory
+from derain.sources.trajectory import CALIBRATION, Trajectory, read_trajectory
 
 TIMES, POSES = "times.txt", "poses.txt"
 
@@ -62,7 +62,8 @@ class Records:
     @cached_property
     def stamp(self) -> str:
         """Sizes and times of change of the records that are there."""
-        places = (self._beside(TIMES), self._beside(POSES), self.folder / METADATA)
+        beside = (self._beside(name) for name in (TIMES, POSES, CALIBRATION))
+        places = (*beside, self.folder / METADATA)
         return " ".join(stamp_of(path) for path in places if path is not None and is_file(path))
 
     def __reduce__(self) -> tuple[Callable[[Path], "Records"], tuple[Path]]:

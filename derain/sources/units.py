@@ -85,8 +85,7 @@ def units_of(source: Sequence[Frame], method: Method, block: int = BLOCK) -> lis
         block: Scans of a block.
 
     Returns:
-        The units, in the order of the source. A unit has the key of its first frame for an id, and
-        the name of the bag where it is one.
+        The units, in the order of the source. A unit has the key of its first frame for an id.
     """
     return [_unit(*span) for span in spans_of(source, method, block)]
 
@@ -119,7 +118,7 @@ def _unit(recording: Sequence[Frame], begin: int, end: int, window: Window) -> F
     after = tuple(recording[end : end + window.after])
     seen = (*before, *frames, *after)
     return FrameUnit(
-        id=frames[0].sequence if isinstance(frames[0], BagFrame) else frames[0].key,
+        id=frames[0].key,
         size=sum(map(_size, frames)),
         inputs=sha256("\n".join(map(_stamp, seen)).encode()).hexdigest()[:16],
         frames=frames,
@@ -136,8 +135,10 @@ def _size(frame: Frame) -> int:
 
 
 def _stamp(frame: Frame) -> str:
-    """The frame's name in its recording, and what changes when its file does."""
+    """The frame's name, and what changes when its file or its pose does."""
+    given = frame.sensor_to_world
+    pose = "" if given is None else sha256(given.tobytes()).hexdigest()
     try:
-        return f"{frame.key} {frame.stamp()}"
+        return f"{frame.key} {frame.stamp()} {pose}"
     except InputError:
-        return frame.key
+        return f"{frame.key} {pose}"

@@ -2,6 +2,8 @@
 
 import ctypes
 import os
+from contextlib import suppress
+from pathlib import Path
 
 # Parameters of mallopt, and the largest value of the second.
 # Source: glibc, malloc/malloc.h and mallopt(3).
@@ -12,6 +14,10 @@ LARGEST_MMAP_THRESHOLD = 2**25
 # training, where a step holds the features of all layers, the most that mallopt accepts.
 KEPT = 2**28
 KEPT_IN_TRAINING = 2**31 - 1
+
+# Where Linux has the limit of a container's memory.
+# Source: Linux, Documentation/admin-guide/cgroup-v2.rst.
+GROUP_LIMIT = Path("/sys/fs/cgroup/memory.max")
 
 
 def keep_freed_memory(kept: int = KEPT) -> None:
@@ -32,8 +38,11 @@ def keep_freed_memory(kept: int = KEPT) -> None:
 
 
 def total_memory() -> int:
-    """Bytes of the machine's memory; of systems that do not name it, none."""
+    """Bytes of memory that this process may have; of systems that do not name it, none."""
     try:
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+        memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, OSError, ValueError):
         return 0
+    with suppress(OSError, ValueError):  # ValueError: no limit, ``max``, is no number
+        memory = min(memory, int(GROUP_LIMIT.read_text("utf-8")))
+    return memory

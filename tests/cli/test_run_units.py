@@ -76,7 +76,7 @@ def test_shares_are_those_of_a_slurm_array_and_the_status_names_what_is_missing(
 ) -> None:
     out = tmp_path / "out"
     monkeypatch.setenv("SLURM_ARRAY_TASK_MIN", "1")
-    monkeypatch.setenv("SLURM_ARRAY_TASK_COUNT", "3")
+    monkeypatch.setenv("SLURM_ARRAY_TASK_MAX", "3")
     (scans / "000004.bin").write_bytes(b"broken")
     for task in (1, 3):
         monkeypatch.setenv("SLURM_ARRAY_TASK_ID", str(task))

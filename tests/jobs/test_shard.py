@@ -1,4 +1,4 @@
-"""Shares of a job: complete, disjoint, balanced, and the same for every task."""
+"""Shards of a job: complete, disjoint, balanced, and the same for every task."""
 
 import random
 
@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from derain.errors import InputError
-from derain.jobs.shard import Shard, array_expression, shares
+from derain.jobs.shard import Shard, array_expression, shard_numbers
 from derain.jobs.unit import Unit
 
 SIZES = st.lists(st.integers(0, 10**9), max_size=60)
@@ -18,20 +18,20 @@ def units_of(sizes: list[int]) -> list[Unit]:
 
 
 @given(SIZES, st.integers(1, 9), st.randoms())
-def test_shares_hold_each_unit_once_whatever_the_order(
+def test_shards_hold_each_unit_once_whatever_the_order(
     sizes: list[int], count: int, generator: random.Random
 ) -> None:
     units = units_of(sizes)
-    number_of = shares(units, count)
+    number_of = shard_numbers(units, count)
     assert number_of.keys() == {unit.id for unit in units}
     generator.shuffle(units)
-    assert shares(units, count) == number_of
+    assert shard_numbers(units, count) == number_of
     parts = [Shard(number, count).of(units) for number in range(count)]
     assert sorted(unit.id for part in parts for unit in part) == sorted(number_of)
 
 
 @given(SIZES, st.integers(1, 9))
-def test_no_share_is_larger_than_another_by_more_than_its_last_unit(
+def test_no_shard_is_larger_than_another_by_more_than_its_last_unit(
     sizes: list[int], count: int
 ) -> None:
     units = units_of(sizes)
@@ -52,7 +52,7 @@ def test_the_tasks_of_a_slurm_array_are_counted_from_its_first() -> None:
     environment = {
         "SLURM_ARRAY_TASK_ID": "7",
         "SLURM_ARRAY_TASK_MIN": "5",
-        "SLURM_ARRAY_TASK_COUNT": "4",
+        "SLURM_ARRAY_TASK_MAX": "8",
     }
     task = Shard.of_environment(environment)
     assert task == Shard(2, 4, first=5, of_array=True)
@@ -60,22 +60,22 @@ def test_the_tasks_of_a_slurm_array_are_counted_from_its_first() -> None:
     assert task.within(None) == task
 
 
-def test_tasks_that_are_run_again_do_the_shares_that_the_job_was_begun_in() -> None:
+def test_tasks_that_are_run_again_do_the_shards_that_the_job_was_begun_in() -> None:
     environment = {
         "SLURM_ARRAY_TASK_ID": "17",
         "SLURM_ARRAY_TASK_MIN": "3",
-        "SLURM_ARRAY_TASK_COUNT": "5",
+        "SLURM_ARRAY_TASK_MAX": "20",
     }
     task = Shard.of_environment(environment)
     assert task is not None
     assert task.within((100, 1)) == Shard(16, 100, first=1, of_array=True)
-    with pytest.raises(InputError, match="no share 17 of 10"):
+    with pytest.raises(InputError, match="no shard 17: the 10 shards are 0 to 9"):
         task.within((10, 0))
     assert Shard(1, 2).within((100, 1)) == Shard(1, 2)
 
 
-def test_a_share_that_is_not_there_is_refused() -> None:
-    with pytest.raises(InputError, match=r"no share 4 of 4.*0 to 3"):
+def test_a_shard_that_is_not_there_is_refused() -> None:
+    with pytest.raises(InputError, match=r"no shard 4.*0 to 3"):
         Shard.of_text("4/4")
     for text in ("4", "a/b", "-1/4", "1/0x4"):
         with pytest.raises(ValueError, match="I/N"):

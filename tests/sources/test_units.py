@@ -131,4 +131,4 @@ def test_methods_that_find_poses_see_whole_recordings(drive: Path) -> None:
 def test_a_bag_is_one_unit(tmp_path: Path) -> None:
     source = derain.named_frames(small_bag(tmp_path, "mcap"))
     (unit,) = units_of(source, derain.FilterDerainer(derain.DROR()), block=1)
-    assert (unit.id, len(unit.frames)) == ("drive", len(source))
+    assert (unit.id, len(unit.frames)) == (source[0].key, len(source))
