@@ -73,7 +73,7 @@ def teach(
             processes find all files by the same paths. None does them in this process.
 
     Returns:
-        The manifest. It is not finished, and nothing is in its place, while other shares of the
+        The manifest. It is not finished, and nothing is in its place, while other shards of the
         units are to be done.
 
     Raises:
@@ -114,11 +114,11 @@ def _by_units(
     """Labels the units that are not done.
 
     Returns:
-        The frames of which something is known; None while other shares are to be done.
+        The frames of which something is known; None while other shards are to be done.
     """
-    share = task.job.share_of(units, division.shard)
-    results = (each.result for each in run(task, share, executor))
-    frames = _known(results, sum(len(unit.frames) for unit in share), guard, watch)
+    shard = task.job.shard_of(units, division.shard)
+    results = (each.result for each in run(task, shard, executor))
+    frames = _known(results, sum(len(unit.frames) for unit in shard), guard, watch)
     if division.shard is None:
         return frames
     scans = completed(task, units)
@@ -220,7 +220,7 @@ def refuse_to_overwrite(out: Path, source: Source) -> None:
 def _put_in_place(folder: Path, out: Path, manifest: Manifest, card: DataCard | None) -> None:
     """Replaces the folder's contents; if it is interrupted, the manifest is marked unfinished.
 
-    Two commands that do the last shares may do it at once.
+    Two commands that do the last shards may do it at once.
     """
     Manifest(manifest.teacher, finished=False).write(out)
     labels = {label_path(out, scan.key): label_path(folder, scan.key) for scan in manifest.scans}

@@ -31,7 +31,7 @@ derain/simulation/worlds/world.yaml.
   derain simulate --out worlds --world --sequences 500
   derain fit --config relative_outdet_worlds.yaml --data.root worlds --data.make false
 
-Many machines make one data set, in a folder that all of them see: by --dask, or each by its share.
+Many machines make one data set, in a folder that all of them see: by --dask, or each by its shard.
 Whichever ends last completes manifest.json. Neither changes a byte.
 
   derain simulate --out worlds --world --sequences 100000 --shard 0/4
@@ -192,7 +192,7 @@ def main(arguments: argparse.Namespace) -> int:
     with executor_of(arguments, arguments.workers or usable_cores()) as executor:
         complete = simulate_track(arguments.out, campaign, executor, shard_of(arguments))
     if not complete:
-        print_lines(f"How far the other shares are: derain status {arguments.out}")
+        print_lines(f"How far the other shards are: derain status {arguments.out}")
         return 0
     sequences = len(campaign.names)
     scans = sequences * (1 if in_world else arguments.scans)

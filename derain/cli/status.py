@@ -6,7 +6,7 @@
 A unit is a recording, a bag, or a block of scans of a long recording; of simulate it is a sequence.
 Runs of more than 50 scans keep a record of each unit in the folder of --out, and so do runs by
 several processes or machines; simulate and teach always do. A failed unit is done again by the same
-command, and so is a missing one. For shares of a SLURM array, the last line has the tasks that are
+command, and so is a missing one. For shards of a SLURM array, the last line has the tasks that are
 to be run again.
 The exit code is 2 unless all units are done.
 """

@@ -17,8 +17,8 @@ around it, too. derain writes the labels, their data card and a list of the scan
 their place. The last fifth of each sequence is the validation part. Scans without any known point
 are left out.
 Of more than --block scans derain keeps records in --out: what was stopped goes on, and `derain
-status` prints how far it is. Processes, a Dask cluster and shares write the same bytes; the labels
-are put in their place when all are there. Where scans of a share failed, the same command without
+status` prints how far it is. Processes, a Dask cluster and shards write the same bytes; the labels
+are put in their place when all are there. Where scans of a shard failed, the same command without
 --shard ends it.
 With --card, the meaning of the scans' own labels, derain also compares its labels with these, for
 the record only: they do not change the result.
@@ -115,7 +115,7 @@ def main(arguments: argparse.Namespace) -> int:
             stream,
         )
     if not results.manifest.finished:
-        print_lines(f"How far the other shares are: derain status {arguments.out}", stream)
+        print_lines(f"How far the other shards are: derain status {arguments.out}", stream)
     failed = len(failures.errors)
     return exit_code(failed, len(source), "{scans} could not be judged, and have no labels")
 

@@ -67,12 +67,12 @@ def add_shard(group: "argparse._ArgumentGroup") -> None:
         "--shard",
         type=shard,
         metavar="I/N",
-        help="do share I of N, from 0 on (default: by SLURM_ARRAY_TASK_ID, where there is one)",
+        help="do shard I of N, from 0 on (default: by SLURM_ARRAY_TASK_ID, where there is one)",
     )
 
 
 def shard(text: str) -> Shard:
-    """A share of the units."""
+    """A shard of the units."""
     try:
         return Shard.of_text(text)
     except InputError as error:
@@ -82,10 +82,10 @@ def shard(text: str) -> Shard:
 
 
 def shard_of(arguments: argparse.Namespace) -> Shard | None:
-    """The share of the work that is done, of which it warns where nobody asked; None for all."""
+    """The shard of the work that is done, of which it warns where nobody asked; None for all."""
     found: Shard | None = arguments.shard or Shard.of_environment()
     if found is not None and found.of_array:
-        warn(f"{TASK} is {found.number + found.first}: one share is done; --shard 0/1 does all")
+        warn(f"{TASK} is {found.number + found.first}: one shard is done; --shard 0/1 does all")
     return found
 
 
@@ -98,7 +98,7 @@ def division_of(arguments: argparse.Namespace) -> Division:
     of_shard = shard_of(arguments)
     if arguments.anew and of_shard is not None:
         raise InputError(
-            "--anew", "excludes shares of the work", "Give --out another folder instead."
+            "--anew", "excludes shards of the work", "Give --out another folder instead."
         )
     resume = arguments.resume or arguments.workers is not None or arguments.dask is not None
     return Division(arguments.block, of_shard, resume, arguments.anew)
@@ -108,7 +108,7 @@ def workers_of(arguments: argparse.Namespace, count_units: Callable[[], int]) ->
     """The number of processes.
 
     Unless it is named, there are as many as threads where each has several units to do: they are
-    faster then, also on two cores (BENCHMARK.md). Otherwise there is one, as in a share of the
+    faster then, also on two cores (BENCHMARK.md). Otherwise there is one, as in a shard of the
     work, of which a batch system may start several on a machine.
 
     Args:

@@ -35,7 +35,7 @@ class Job:
         folder: The folder of the results.
         options: Texts, numbers, true or false by name, among them the command and derain's version:
             all of what the results depend on but the inputs.
-        shards: How many shares it was begun in, and what a batch system calls the first of them;
+        shards: How many shards it was begun in, and what a batch system calls the first of them;
             None where it was begun as a whole.
     """
 
@@ -52,7 +52,7 @@ class Job:
         Args:
             folder: The folder of the results, made if missing.
             options: The options.
-            shard: The share that is done now; None for all of it.
+            shard: The shard that is done now; None for all of it.
             anew: Whether the records of another job are removed; its results stay until they are
                 written anew.
 
@@ -109,12 +109,12 @@ class Job:
         listed = [[unit.id, unit.size, unit.inputs] for unit in units]
         _write(self.folder / FOLDER / UNITS, listed)
 
-    def share_of(self, units: list[UnitT], shard: Shard | None) -> list[UnitT]:
-        """The units of a share, in their order.
+    def shard_of(self, units: list[UnitT], shard: Shard | None) -> list[UnitT]:
+        """The units of a shard, in their order.
 
         Args:
             units: All units.
-            shard: The share; None for all of them.
+            shard: The shard; None for all of them.
         """
         return units if shard is None else shard.within(self.shards).of(units)
 

@@ -6,8 +6,8 @@ sequences/000/...   see :mod:`derain.simulation.sequence`
 
 A sequence is a unit of a job, and its folder appears when it is complete, so that an interrupted
 run can be taken up again. Each sequence is drawn with a random generator of its own, so that
-neither an interruption nor processes, shares and machines change a byte. Of two runs on one folder
-the second waits for the first; shares of one run do not wait for each other.
+neither an interruption nor processes, shards and machines change a byte. Of two runs on one folder
+the second waits for the first; shards of one run do not wait for each other.
 """
 
 import os
@@ -73,11 +73,11 @@ def simulate_track(
         root: Folder to write: a new or an empty one, or one that holds part of this very data set.
         campaign: What to simulate.
         executor: Simulates the sequences; None does it in this process.
-        shard: The share of the sequences that is simulated; None for all. Whoever does the last
-            share completes the manifest.
+        shard: The shard of the sequences that is simulated; None for all. Whoever does the last
+            shard completes the manifest.
 
     Returns:
-        Whether the data set is complete; False while other shares are to be simulated.
+        Whether the data set is complete; False while other shards are to be simulated.
 
     Raises:
         InputError: The folder holds something else or cannot be written, Open3D cannot be imported,
@@ -101,7 +101,7 @@ def _simulate(
         root: Folder of the data set.
         campaign: What to simulate.
         executor: Simulates the sequences.
-        shard: The share that is simulated.
+        shard: The shard that is simulated.
         keep: Whether the data set is a person's; otherwise :func:`ensure_track` may replace it.
     """
     campaign = campaign.resolved()  # reports a wrong file first
@@ -123,7 +123,7 @@ def _simulate(
         units = [Unit(id=name, size=1, inputs="") for name in campaign.names]
         job.list_units(units)
         task = Task(job, work)
-        _run(task, job.share_of(units, shard), executor)
+        _run(task, job.shard_of(units, shard), executor)
         outcomes = completed(task, units)
         if outcomes is None:
             return False
@@ -230,7 +230,7 @@ def _locked(root: Path, *, shared: bool) -> Iterator[None]:
 
     Args:
         root: The folder.
-        shared: Whether the shares of one run may simulate in it at the same time.
+        shared: Whether the shards of one run may simulate in it at the same time.
     """
     if root.exists() and not root.is_dir():
         raise InputError(root, "is not a folder", "Name a new or empty folder.")

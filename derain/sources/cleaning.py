@@ -129,7 +129,7 @@ def clean(
             job = _job(source, work, opened, division)
             units = units_of(source, method, division.block)
             job.list_units(units)
-            units = job.share_of(units, division.shard)
+            units = job.shard_of(units, division.shard)
             outcomes = _counted(run(Task(job, work), units, executor), opened)
         else:
             units = [whole(source)]

@@ -20,10 +20,10 @@ from derain.system.notices import Notices, warn
 
 @dataclass(frozen=True)
 class TeachResults:
-    """The labels of recordings, or of a share of them.
+    """The labels of recordings, or of a shard of them.
 
     Attributes:
-        manifest: The labelled scans, as written; not finished while other shares are to be done.
+        manifest: The labelled scans, as written; not finished while other shards are to be done.
         judged: How many scans were judged; those of which nothing is known have no labels.
         answers: Counts of the labels by range.
         record: Scores by the scans' own labels; None where there is no card.

@@ -68,7 +68,7 @@ def test_a_data_set_is_written_and_written_once(succeed, refused, facts_of, tmp_
     assert (root / "manifest.json").read_text() == manifest
 
 
-def test_shares_are_counted_by_the_status(
+def test_shards_are_counted_by_the_status(
     succeed, run_derain, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     root = tmp_path / "worlds"

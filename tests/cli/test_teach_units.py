@@ -1,4 +1,4 @@
-"""``derain teach`` in units: the same labels and figures by processes, shares, and after a stop."""
+"""``derain teach`` in units: the same labels and figures by processes, shards, and after a stop."""
 
 import json
 import shutil
@@ -81,7 +81,7 @@ def test_what_was_stopped_goes_on_with_the_same_figures(
     assert kept.stat().st_mtime_ns == written
 
 
-def test_shares_put_the_labels_in_place_when_the_last_is_done(
+def test_shards_put_the_labels_in_place_when_the_last_is_done(
     succeed, drive: Path, run_derain, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"

@@ -1,4 +1,4 @@
-"""The data set that the simulation writes: whole, resumable, the same by workers and shares."""
+"""The data set that the simulation writes: whole, resumable, the same by workers and shards."""
 
 import fcntl
 import hashlib
@@ -132,7 +132,7 @@ def test_a_run_that_failed_leaves_nothing_half_written_and_is_taken_up_by_any_wo
     assert checksums(root) == checksums(track)
 
 
-def test_shares_make_the_same_data_set_and_the_last_completes_its_manifest(
+def test_shards_make_the_same_data_set_and_the_last_completes_its_manifest(
     track: Path, tmp_path: Path
 ) -> None:
     root = tmp_path / "track"
