@@ -116,7 +116,7 @@ def _simulated(layout: str, sensor: str, rate: float) -> tuple[Scan, NDArray[np.
     """A scan of one place at a rate, and what is rain of it."""
     campaign = Campaign(1, 0, 0, scans=1, rain_rates=(rate,), sensor=sensor, layout=layout)
     with tempfile.TemporaryDirectory() as folder:
-        simulate_track(Path(folder) / "track", campaign, workers=1)
+        simulate_track(Path(folder) / "track", campaign)
         (path,) = (Path(folder) / "track/sequences/000").glob("lidar*/*.bin")
         (label,) = (Path(folder) / "track/sequences/000").glob("*labels*/*.label")
         scan = read_scan(path)

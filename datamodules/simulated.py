@@ -6,6 +6,7 @@ from derain.cards.card import load_card
 from derain.datamodules.base import Loading
 from derain.datamodules.sequences import SequenceDataModule
 from derain.errors import InputError
+from derain.jobs.workers import processes
 from derain.simulation.campaign import Campaign
 from derain.simulation.dataset import ensure_track
 from derain.simulation.manifest import read_manifest
@@ -57,7 +58,8 @@ class SimulatedDataModule(SequenceDataModule):
             InputError: A folder that holds something else or cannot be written.
         """
         if self.make:
-            ensure_track(self.root, self.campaign, self.workers)
+            with processes(self.workers) as executor:
+                ensure_track(self.root, self.campaign, executor)
 
 
 class Simulated(SimulatedDataModule):

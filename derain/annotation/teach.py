@@ -2,16 +2,15 @@
 
 import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import yaml
-from numpy.typing import NDArray
 from tqdm import tqdm
 
+from derain.annotation.labelling import TAUGHT_CARD, LabelledScan, Labelling
 from derain.annotation.manifest import (
     CARD,
     LABELS,
@@ -24,32 +23,23 @@ from derain.annotation.manifest import (
 )
 from derain.cards.card import DataCard
 from derain.errors import InputError
-from derain.evaluation.answers import TEACHERS_ANSWERS
 from derain.files.atomic import replacing
-from derain.files.labels import write_labels
+from derain.files.labels import LABEL
+from derain.jobs.job import FOLDER, Job
+from derain.jobs.running import Submits, Task, completed, run
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
-from derain.sources.judgement import Judgement
-from derain.sources.judging import Answer, Guard, judgements, unguarded
+from derain.sources.judging import Guard, unguarded
 from derain.sources.method import Method
 from derain.sources.sink import FolderSink, LabelSink
 from derain.sources.source import Source
-
-# Class ids of a teacher's answers.
-TAUGHT_NOT_RAIN, TAUGHT_RAIN, TAUGHT_UNKNOWN = 0, 1, 255
-TAUGHT_CLASSES = (TAUGHT_NOT_RAIN, TAUGHT_RAIN, TAUGHT_UNKNOWN)
-TAUGHT_CARD = DataCard(
-    "taught",
-    classes=dict(zip(TAUGHT_CLASSES, TEACHERS_ANSWERS.values(), strict=True)),
-    rain=(TAUGHT_RAIN,),
-    unknown=(TAUGHT_UNKNOWN,),
-)
+from derain.sources.units import Division, FrameUnit, units_of, whole
 
 # The folder of the labels until all of them are known.
 UNFINISHED = ".unfinished"
 
-# Called for each scan with the teacher's answer and the labels made of it, uint32 (N,).
-Watch = Callable[[Answer, NDArray[np.uint32]], None]
+# Receives each labelled scan.
+Watch = Callable[[LabelledScan], None]
 
 
 def teach(
@@ -58,12 +48,15 @@ def teach(
     out: Path,
     card: DataCard | None = None,
     guard: Guard = unguarded,
-    watch: Watch = lambda answer, labels: None,
+    watch: Watch = lambda scan: None,
+    division: Division | None = None,
+    executor: Submits | None = None,
 ) -> Manifest:
     """Labels recordings: 0 is not rain, 1 rain, 255 not known.
 
-    Labels of the scans are never read. Scans of which nothing is known are left out: they neither
-    train nor measure a student. The folder stays unchanged until every scan is judged.
+    Labels of the scans never change the result. Scans of which nothing is known are left out: they
+    neither train nor measure a student. The folder stays unchanged until every scan is judged, but
+    for the hidden folder in which the labels wait where records are kept.
 
     Args:
         method: The teacher.
@@ -71,57 +64,105 @@ def teach(
         out: Folder to write: a new one, or one of an earlier teaching. It gets the labels, their
             data card, and a manifest with the paths of the scans.
         card: Data card of the scans, from which the new one takes licence and unit.
-        guard: Surrounds the work on each scan; a scan whose error it suppresses gets no labels.
+        guard: Surrounds the error of each scan; a scan whose error it suppresses gets no labels.
         watch: Called for each scan as soon as it is judged, in order.
+        division: How the scans are divided into units. Where there are more scans than a block has,
+            a record of each unit is kept in the folder, by which a teaching that was stopped goes
+            on. None keeps no records.
+        executor: Does the units: an executor of :mod:`concurrent.futures` or the like, whose
+            processes find all files by the same paths. None does them in this process.
 
     Returns:
-        The manifest.
+        The manifest. It is not finished, and nothing is in its place, while other shards of the
+        units are to be done.
 
     Raises:
         InputError: Scans that are in no files; a folder that holds something else, or in which the
             scans' own labels are; a scan that cannot be read or judged, unless the guard suppresses
-            the error; no point of which anything is known.
+            the error; no point of which anything is known; records of other options in the folder;
+            an executor that has ended.
     """
     refuse_to_overwrite(out, source)
-    frames: list[FileFrame] = []
+    fingerprint = method.fingerprint()
+    if division is not None and division.keeps_records(source, out):
+        place = out.absolute()  # other processes may work in another folder
+        # The labels of all scans stay there, and are linked to where they belong.
+        work = Labelling(method, fingerprint, place / FOLDER, card)
+        options = work.options("teach", source, division.block)
+        options["card"] = None if card is None else card.name
+        task = Task(Job.begin(place, options, division.shard, division.anew), work)
+        units = units_of(source, method, division.block)
+        task.job.list_units(units)
+        frames = _by_units(task, units, division, executor, guard, watch)
+        if frames is None:
+            return Manifest(method.as_dict(), finished=False)
+        return _finish(work, out, frames)
     with _unfinished(out) as folder:
-        unlabelled = source.map(Frame.without_labels)
-        shown = tqdm(unlabelled, desc="teaching", unit="scan", disable=None)
-        for answer in judgements(method, shown, guard):
-            frame, judgement, _ = answer
-            assert isinstance(frame, FileFrame)  # refused above
-            labels = labels_of(judgement)
-            watch(answer, labels)
-            if (labels != TAUGHT_UNKNOWN).any():
-                write_labels(label_path(folder, frame.key), labels)
-                frames.append(frame)
-        if not frames:
-            raise InputError(
-                out,
-                "nothing is written, for of no point it is known whether it is rain",
-                "See whether the method suits the scans: some need several of one recording.",
-            )
-        manifest = Manifest(
-            method.as_dict(),
-            [
-                TaughtScan(frame.key, frame.path, frame.sequence, frame.number, part)
-                for frame, part in zip(frames, parts_of(frames), strict=True)
-            ],
-            frames[0].columns,
-            frames[0].intensity_scale,
-        )
-        _put_in_place(folder, out, manifest, card)
-    return manifest
+        work = Labelling(method, fingerprint, folder, card)
+        frames = _known(work.do(whole(source)), len(source), guard, watch)
+        return _finish(work, out, frames)
 
 
-def labels_of(judgement: Judgement) -> NDArray[np.uint32]:
-    """The labels of each row of a judged scan, uint32 (N,), as they are written.
+def _by_units(
+    task: Task[FrameUnit, LabelledScan],
+    units: list[FrameUnit],
+    division: Division,
+    executor: Submits | None,
+    guard: Guard,
+    watch: Watch,
+) -> list[Frame] | None:
+    """Labels the units that are not done.
 
-    Rows of which the method is not sure, which it did not see or which hold no return are unknown.
+    Returns:
+        The frames of which something is known; None while other shards are to be done.
     """
-    labels = np.where(judgement.rain, np.uint32(TAUGHT_RAIN), np.uint32(TAUGHT_NOT_RAIN))
-    labels[~(judgement.answered & judgement.scan.valid)] = TAUGHT_UNKNOWN
-    return labels
+    shard = task.job.shard_of(units, division.shard)
+    results = (each.result for each in run(task, shard, executor))
+    frames = _known(results, sum(len(unit.frames) for unit in shard), guard, watch)
+    if division.shard is None:
+        return frames
+    scans = completed(task, units)
+    return None if scans is None else [scan.frame for scan in scans if scan.is_known]
+
+
+def _known(scans: Iterator[LabelledScan], total: int, guard: Guard, watch: Watch) -> list[Frame]:
+    """The frames of which something is known, after all scans are labelled."""
+    frames: list[Frame] = []
+    for scan in tqdm(scans, total=total, desc="teaching", unit="scan", disable=None):
+        if scan.error is not None:
+            with guard(scan.frame):
+                raise scan.error
+        else:
+            watch(scan)
+            if scan.is_known:
+                frames.append(scan.frame)
+    return frames
+
+
+def _finish(work: Labelling, out: Path, known: Sequence[Frame]) -> Manifest:
+    """Puts the labels, their card and the manifest in their place.
+
+    Raises:
+        InputError: Nothing is known of any scan.
+    """
+    frames = [frame for frame in known if isinstance(frame, FileFrame)]  # all are in files
+    if not frames:
+        raise InputError(
+            out,
+            "nothing is written, for of no point it is known whether it is rain",
+            "See whether the method suits the scans: some need several of one recording.",
+        )
+    manifest = Manifest(
+        work.method.as_dict(),
+        [
+            TaughtScan(frame.key, frame.path, frame.sequence, frame.number, part)
+            for frame, part in zip(frames, parts_of(frames), strict=True)
+        ],
+        frames[0].columns,
+        frames[0].intensity_scale,
+    )
+    _put_in_place(work.folder, out, manifest, work.card)
+    return manifest
 
 
 def write_card(path: Path, teacher: str, scans: DataCard | None) -> None:
@@ -177,12 +218,28 @@ def refuse_to_overwrite(out: Path, source: Source) -> None:
 
 
 def _put_in_place(folder: Path, out: Path, manifest: Manifest, card: DataCard | None) -> None:
-    """Replaces the folder's contents; if it is interrupted, the manifest is marked unfinished."""
+    """Replaces the folder's contents; if it is interrupted, the manifest is marked unfinished.
+
+    Two commands that do the last shards may do it at once.
+    """
     Manifest(manifest.teacher, finished=False).write(out)
-    shutil.rmtree(out / LABELS, ignore_errors=True)  # of an earlier teaching
-    (folder / LABELS).rename(out / LABELS)
+    labels = {label_path(out, scan.key): label_path(folder, scan.key) for scan in manifest.scans}
+    for earlier in (out / LABELS).rglob(f"*{LABEL}"):
+        if earlier not in labels:
+            earlier.unlink(missing_ok=True)
+    for target, written in labels.items():
+        with replacing(target) as temporary:
+            _link(written, temporary)
     write_card(out / CARD, Path(manifest.teacher["method"]).stem, card)
     manifest.write(out)
+
+
+def _link(file: Path, name: Path) -> None:
+    """Gives a file another name."""
+    try:
+        os.link(file, name)
+    except OSError:  # a file system without links
+        shutil.copyfile(file, name)
 
 
 @contextmanager

@@ -18,8 +18,9 @@ A method is a model (.onnx), parameters from `derain tune` (.yaml), default or a
 a baseline: position and intensity, learnt from the training scans, all and none.
 With --runtime, each model has a second row for that runtime, and derain prints how it differs from
 onnxruntime.
-Scoring runs all methods in one process, where filters share one neighbour search. Each method is
-then timed alone, in its own process.
+Scoring runs all methods in one process, where filters share one neighbour search, or in --workers
+processes on blocks of scans, with the same figures. Each method is then timed alone, in its own
+process.
 """
 
 import argparse
@@ -73,6 +74,13 @@ def add_arguments(parser: Parser) -> None:
     )
     parser.add_argument("--paper", choices=TABLES, help="also print this published table")
     add_threads(parser)
+    parser.add_argument(
+        "--workers",
+        type=count,
+        default=1,
+        metavar="N",
+        help="processes that score, which share the threads (default: 1)",
+    )
     add_runtime(parser, help="second runtime for the models")
     parser.add_argument(
         "--timed", type=count, default=10, help="number of timed scans (default: %(default)s)"
@@ -121,7 +129,8 @@ def main(arguments: argparse.Namespace) -> int:
     def bench(frames: Sequence[Frame], out: Path) -> "Bench":
         """Benches the methods on some of the scans, and writes tables and picture."""
         chosen = evenly_spaced(frames, arguments.limit or len(frames))
-        found = run_bench(methods, labelled_frames(data, chosen), effort, command_line(arguments))
+        frames_of_bench, command = labelled_frames(data, chosen), command_line(arguments)
+        found = run_bench(methods, frames_of_bench, effort, command, arguments.workers)
         found.write(out)
         return found
 

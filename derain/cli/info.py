@@ -35,7 +35,7 @@ import yaml
 from derain.bags.names import is_bag, within
 from derain.cli.info_file import facts_of_file
 from derain.cli.info_folder import draw, facts_of_folder
-from derain.cli.options import add_columns, add_topic
+from derain.cli.options import add_columns, add_topic, count
 from derain.cli.outputs import print_lines
 from derain.default import DEFAULT, ModelCard, ModelScore, default_model, model_card
 from derain.errors import InputError, printable
@@ -72,6 +72,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="names of a sequence's folders of scans and labels (default: known names)",
     )
     parser.add_argument("--picture", type=Path, help="draw a folder's statistics to this PNG file")
+    parser.add_argument(
+        "--workers",
+        type=count,
+        default=1,
+        metavar="N",
+        help="processes that count a folder's points (default: 1)",
+    )
     parser.add_argument(
         "--formats", action=_ListFormats, nargs=0, help="list the formats of scans, and exit"
     )
@@ -147,7 +154,9 @@ def _describe_default(as_json: bool) -> None:
 
 
 def _describe_folder(folder: Path, arguments: argparse.Namespace) -> None:
-    facts = facts_of_folder(folder, arguments.card, arguments.layout, arguments.columns)
+    facts = facts_of_folder(
+        folder, arguments.card, arguments.layout, arguments.columns, arguments.workers
+    )
     print_lines(json.dumps(facts.as_dict()) if arguments.json else facts.as_text())
     if arguments.card is not None and not facts.total.labelled:
         warn(

@@ -11,10 +11,13 @@ from derain.cards.card import DataCard, load_card
 from derain.cards.known import card_by_folders, layouts_for
 from derain.cards.layout import Layout
 from derain.errors import InputError
-from derain.evaluation.contents import Contents, class_name, count_frame, find_sequences, rate_name
+from derain.evaluation.contents import Contents, class_name, count_frames, find_sequences, rate_name
 from derain.evaluation.text_tables import plain_table
+from derain.jobs.workers import each_by
 from derain.simulation.manifest import manifest_of
 from derain.sources.folders import find_layout
+from derain.sources.frame import Frame
+from derain.sources.units import BLOCK
 
 # What a data card is chosen by. Names of folders that many data sets have make it a guess.
 CardRestsOn = Literal["--card", "manifest", "names of folders"]
@@ -106,7 +109,11 @@ class FolderFacts:
 
 
 def facts_of_folder(
-    folder: Path, card_name: str | None, layout_names: str | None, columns: Sequence[str]
+    folder: Path,
+    card_name: str | None,
+    layout_names: str | None,
+    columns: Sequence[str],
+    workers: int = 1,
 ) -> FolderFacts:
     """Counts what is in a folder.
 
@@ -116,6 +123,7 @@ def facts_of_folder(
         layout_names: Names of its folders of scans and labels, with a comma between; None finds
             them.
         columns: Names of the columns of files that do not name them.
+        workers: Processes that count.
 
     Raises:
         InputError: A folder without scans, a file in it that cannot be read, or no such data card.
@@ -128,14 +136,18 @@ def facts_of_folder(
         {sequence.rain_rate for sequence in sequences}, key=lambda rate: (rate is None, rate or 0)
     )
     by_rain_rate = {rate: Contents() for rate in rates}
-    scans = sum(len(sequence.frames) for sequence in sequences)
+    blocks: list[tuple[float | None, list[Frame]]] = []
+    for sequence in sequences:
+        by_rain_rate[sequence.rain_rate].sequences += 1
+        frames = list(sequence.frames)
+        starts = range(0, len(frames), BLOCK)
+        blocks += [(sequence.rain_rate, frames[start : start + BLOCK]) for start in starts]
+    scans = sum(len(frames) for _, frames in blocks)
+    counted = each_by(workers, count_frames, [frames for _, frames in blocks])
     with tqdm(total=scans, unit="scan", disable=None) as progress:
-        for sequence in sequences:
-            contents = by_rain_rate[sequence.rain_rate]
-            contents.sequences += 1
-            for frame in sequence.frames:
-                contents.add(count_frame(frame))
-                progress.update()
+        for (rate, frames), contents in zip(blocks, counted, strict=True):
+            by_rain_rate[rate].add(contents)
+            progress.update(len(frames))
     return FolderFacts(folder, layout, card, rests_on, by_rain_rate)
 
 

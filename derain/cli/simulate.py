@@ -19,8 +19,8 @@ With --speed the sensor drives along a street, without a radar; with --traffic c
 move. derain then also writes poses.txt, and numbers moving objects in the upper 16 bits of the
 labels.
 
-The sequences take the rain rates in turn; 0 is clean. A second call continues an interrupted run.
-To train on the data set:
+The sequences take the rain rates in turn; 0 is clean. A second call continues an interrupted run;
+`derain status` prints how far it is. To train on the data set:
 
   derain fit --config outdet_simulated.yaml --data.root facility --data.make false
 
@@ -30,6 +30,12 @@ derain/simulation/worlds/world.yaml.
 
   derain simulate --out worlds --world --sequences 500
   derain fit --config relative_outdet_worlds.yaml --data.root worlds --data.make false
+
+Many machines make one data set, in a folder that all of them see: by --dask, or each by its shard.
+Whichever ends last completes manifest.json. Neither changes a byte.
+
+  derain simulate --out worlds --world --sequences 100000 --shard 0/4
+  derain status worlds
 
 With --on, derain adds rain to clean scans instead, in the format of the file with all its columns,
 and writes <stem>.label (1 = rain).
@@ -57,6 +63,7 @@ from derain.cli.outputs import (
     print_facts,
     print_lines,
 )
+from derain.cli.unit_options import add_executor, add_shard, executor_of, shard_of
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS
 from derain.simulation.classes import TrackClass
@@ -84,9 +91,11 @@ DATA_SET_DEFAULTS: dict[str, Any] = {
     "speed": 0.0,
     "traffic": 0,
     "skew": False,
-    "workers": usable_cores(),
+    "workers": None,  # one per core, unless --dask names others
+    "dask": None,
+    "shard": None,
 }
-OF_NO_WORLD = [name for name in DATA_SET_DEFAULTS if name not in ("sequences", "workers")]
+OF_NO_WORLD = ("layout", "scans", "radar", "speed", "traffic", "skew")
 SCAN_OPTIONS = ("columns", "picture", "json")
 
 
@@ -138,7 +147,8 @@ def _add_data_set_options(group: "argparse._ArgumentGroup") -> None:
         action=argparse.BooleanOptionalAction,
         help="simulate a 4D radar (default: yes, but not on a drive)",
     )
-    group.add_argument("--workers", type=count, help="processes (default: one per core)")
+    add_executor(group, "processes (default: one per core)")
+    add_shard(group)
     group.add_argument(
         "--world",
         nargs="?",
@@ -179,7 +189,11 @@ def main(arguments: argparse.Namespace) -> int:
         if getattr(arguments, name) is None:
             setattr(arguments, name, value)
     campaign = _world_campaign(arguments) if in_world else _campaign(arguments)
-    simulate_track(arguments.out, campaign, arguments.workers)
+    with executor_of(arguments, arguments.workers or usable_cores()) as executor:
+        complete = simulate_track(arguments.out, campaign, executor, shard_of(arguments))
+    if not complete:
+        print_lines(f"How far the other shards are: derain status {arguments.out}")
+        return 0
     sequences = len(campaign.names)
     scans = sequences * (1 if in_world else arguments.scans)
     print_lines(

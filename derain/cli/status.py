@@ -1,12 +1,13 @@
-"""Prints how far a run is that keeps records: done, failed and missing units, and totals.
+"""Prints how far a run, simulate or teach is: done, failed and missing units, and totals of a run.
 
   derain status cleaned
-  derain status cleaned --json
+  derain status worlds --json
 
-A unit is a recording, a bag, or a block of scans of a long recording. Runs of more than 50 scans
-keep a record of each unit in the folder of --out, and so do runs by several processes or machines.
-A failed unit is done again by the same command, and so is a missing one. For a run in shares of a
-SLURM array, the last line has the tasks that are to be run again.
+A unit is a recording, a bag, or a block of scans of a long recording; of simulate it is a sequence.
+Runs of more than 50 scans keep a record of each unit in the folder of --out, and so do runs by
+several processes or machines; simulate and teach always do. A failed unit is done again by the same
+command, and so is a missing one. For shards of a SLURM array, the last line has the tasks that are
+to be run again.
 The exit code is 2 unless all units are done.
 """
 
@@ -16,6 +17,8 @@ from pathlib import Path
 
 from derain.cli.outputs import print_lines
 from derain.cli.parser import Parser
+from derain.jobs.job import Job
+from derain.jobs.record import Record
 from derain.jobs.status import JobStatus, job_status
 from derain.sources.cleaned_totals import CleanedTotals
 
@@ -31,26 +34,35 @@ def add_arguments(parser: Parser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    totals = CleanedTotals()
-    status = job_status(arguments.out, totals.add)
+    is_run = Job.at(arguments.out).options.get("command") == "run"
+    cleaned = CleanedTotals() if is_run else None
+    status = job_status(arguments.out, _pass_over if cleaned is None else cleaned.add)
     if arguments.json:
-        print(json.dumps(_as_dict(status, totals)))
+        print(json.dumps(_as_dict(status, cleaned)))
     else:
-        print_lines("\n".join(_lines(status, totals)))
+        print_lines("\n".join(_lines(status, cleaned)))
     return 0 if status.done == len(status.units) else 2
 
 
-def _lines(status: JobStatus, totals: CleanedTotals) -> list[str]:
+def _pass_over(record: Record) -> None:
+    """Adds up nothing."""
+
+
+def _lines(status: JobStatus, cleaned: CleanedTotals | None) -> list[str]:
     lines = [
         f"{status.done:,} of {len(status.units):,} units done, {len(status.failed):,} failed, "
-        f"{len(status.missing):,} missing",
-        str(totals),
+        f"{len(status.missing):,} missing"
     ]
+    done, what = status.done, "units"
+    if cleaned is not None:
+        lines.append(str(cleaned))
+        done, what = cleaned.scans, "scans"
     if seconds := sum(status.seconds.values()):
         workers = len(status.seconds)
-        lines.append(f"{totals.scans / seconds:.2f} scans a second a worker, {workers:,} workers")
-    for hour, weather in totals.worst_hours():
-        lines.append(f"visibility {weather.visibility}: {hour}")
+        lines.append(f"{done / seconds:.2f} {what} a second a worker, {workers:,} workers")
+    if cleaned is not None:
+        hours = cleaned.worst_hours()
+        lines += [f"visibility {weather.visibility}: {hour}" for hour, weather in hours]
     shown = status.failed[:MOST_FAILED]
     lines += [f"failed: {record.unit}: {record.failures[0]}" for record in shown]
     if len(status.failed) > MOST_FAILED:
@@ -60,19 +72,23 @@ def _lines(status: JobStatus, totals: CleanedTotals) -> list[str]:
     return lines
 
 
-def _as_dict(status: JobStatus, totals: CleanedTotals) -> dict[str, object]:
-    return {
+def _as_dict(status: JobStatus, cleaned: CleanedTotals | None) -> dict[str, object]:
+    facts: dict[str, object] = {
         "units": len(status.units),
         "done": status.done,
         "failed": {record.unit: str(record.failures[0]) for record in status.failed},
         "missing": [unit.id for unit in status.missing],
         "array": status.array,
-        "scans": totals.scans,
-        "points": totals.points,
-        "valid": totals.valid,
-        "rain": totals.rain,
         "seconds_by_worker": dict(status.seconds),
-        "visibility_m_by_hour": {
-            hour: weather.visibility.metres for hour, weather in totals.worst_hours(10)
-        },
     }
+    if cleaned is not None:
+        facts |= {
+            "scans": cleaned.scans,
+            "points": cleaned.points,
+            "valid": cleaned.valid,
+            "rain": cleaned.rain,
+            "visibility_m_by_hour": {
+                hour: weather.visibility.metres for hour, weather in cleaned.worst_hours(10)
+            },
+        }
+    return facts

@@ -16,6 +16,10 @@ word is a folder or a scan, the model that comes with derain labels all scans, e
 around it, too. derain writes the labels, their data card and a list of the scans; the scans stay in
 their place. The last fifth of each sequence is the validation part. Scans without any known point
 are left out.
+Of more than --block scans derain keeps records in --out: what was stopped goes on, and `derain
+status` prints how far it is. Processes, a Dask cluster and shards write the same bytes; the labels
+are put in their place when all are there. Where scans of a shard failed, the same command without
+--shard ends it.
 With --card, the meaning of the scans' own labels, derain also compares its labels with these, for
 the record only: they do not change the result.
 """
@@ -32,16 +36,19 @@ from derain.cli.method_options import add_method_and_scans, method_and_scans, me
 from derain.cli.options import add_columns, add_intensity_scale, add_json, add_poses, add_topic
 from derain.cli.outputs import exit_code, print_error, print_facts, print_lines
 from derain.cli.parser import Parser
+from derain.cli.unit_options import add_units, division_of, executor_of, workers_of
 from derain.evaluation.counts import or_none
 from derain.evaluation.text_tables import number_text
 from derain.export.methods import over_recording
 from derain.sources.folders import named_frames
 from derain.sources.judging import Failures
+from derain.sources.units import spans_of
+from derain.system.cores import threads_of
 from derain.system.memory import keep_freed_memory
 from derain.workflows.odometry import placed
 
 if TYPE_CHECKING:
-    from derain.workflows.teaching import LabelledScan
+    from derain.annotation.labelling import LabelledScan
 
 
 def add_arguments(parser: Parser) -> None:
@@ -58,6 +65,7 @@ def add_arguments(parser: Parser) -> None:
     add_topic(parser)
     add_intensity_scale(parser)
     add_poses(parser)
+    add_units(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -66,6 +74,7 @@ def main(arguments: argparse.Namespace) -> int:
     from derain.workflows.teaching import teach_recordings
 
     keep_freed_memory()
+    division = division_of(arguments)
     name, scans = method_and_scans(arguments.method, arguments.scans or [], "teach", "taught")
     method = over_recording(method_of(name, arguments))
     card = None if arguments.card is None else load_card(arguments.card)
@@ -80,15 +89,22 @@ def main(arguments: argparse.Namespace) -> int:
     source = placed(found, arguments.poses, arguments.threads).map(
         lambda frame: frame.with_intensity_times(arguments.intensity_scale)
     )
+    workers = workers_of(arguments, lambda: len(spans_of(source, method, arguments.block)))
+    if workers > 1:
+        arguments.threads = max(threads_of(arguments.threads) // workers, 1)
+        method = over_recording(method_of(name, arguments))
     failures = Failures(print_error)
-    results = teach_recordings(
-        method,
-        source,
-        arguments.out,
-        card=card,
-        guard=failures.skipping_failures,
-        watch=lambda scan: _print_labels(scan, arguments.json),
-    )
+    with executor_of(arguments, workers) as executor:
+        results = teach_recordings(
+            method,
+            source,
+            arguments.out,
+            card=card,
+            guard=failures.skipping_failures,
+            watch=lambda scan: _print_labels(scan, arguments.json),
+            division=division,
+            executor=executor,
+        )
     stream = sys.stderr if arguments.json else sys.stdout
     print_lines(f"{results.judged:,} scans\n{results.answers}", stream)
     record = results.record
@@ -98,6 +114,8 @@ def main(arguments: argparse.Namespace) -> int:
             f"{record.scans:,} scans, which changed nothing:\n{record}",
             stream,
         )
+    if not results.manifest.finished:
+        print_lines(f"How far the other shards are: derain status {arguments.out}", stream)
     failed = len(failures.errors)
     return exit_code(failed, len(source), "{scans} could not be judged, and have no labels")
 

@@ -8,7 +8,7 @@ from derain.cli.options import count
 from derain.errors import InputError
 from derain.jobs.running import Submits
 from derain.jobs.shard import TASK, Shard
-from derain.jobs.workers import WorkerPool
+from derain.jobs.workers import processes
 from derain.sources.units import BLOCK, Division
 from derain.system.cores import threads_of
 from derain.system.memory import total_memory
@@ -22,25 +22,12 @@ MEMORY_OF_WORKER = 2 * 10**9
 
 
 def add_units(parser: argparse.ArgumentParser) -> None:
-    """Declares the options."""
+    """Declares the options of commands that judge many scans."""
     group = parser.add_argument_group("many scans")
-    group.add_argument(
-        "--workers",
-        type=count,
-        metavar="N",
-        help="processes, which share the threads (default: one per thread for many scans, else 1)",
+    add_executor(
+        group, "processes, which share the threads (default: one per thread for many scans, else 1)"
     )
-    group.add_argument(
-        "--dask",
-        metavar="ADDRESS",
-        help="workers of a Dask cluster: address of its scheduler, or the scheduler's file",
-    )
-    group.add_argument(
-        "--shard",
-        type=shard,
-        metavar="I/N",
-        help="do share I of N, from 0 on (default: by SLURM_ARRAY_TASK_ID, where there is one)",
-    )
+    add_shard(group)
     group.add_argument(
         "--resume",
         action="store_true",
@@ -59,8 +46,33 @@ def add_units(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_executor(group: "argparse._ArgumentGroup", workers: str) -> None:
+    """Declares the options of :func:`executor_of`.
+
+    Args:
+        group: Where they are declared.
+        workers: Help of ``--workers``.
+    """
+    group.add_argument("--workers", type=count, metavar="N", help=workers)
+    group.add_argument(
+        "--dask",
+        metavar="ADDRESS",
+        help="workers of a Dask cluster: address of its scheduler, or the scheduler's file",
+    )
+
+
+def add_shard(group: "argparse._ArgumentGroup") -> None:
+    """Declares the option of :func:`shard_of`."""
+    group.add_argument(
+        "--shard",
+        type=shard,
+        metavar="I/N",
+        help="do shard I of N, from 0 on (default: by SLURM_ARRAY_TASK_ID, where there is one)",
+    )
+
+
 def shard(text: str) -> Shard:
-    """A share of the units."""
+    """A shard of the units."""
     try:
         return Shard.of_text(text)
     except InputError as error:
@@ -69,20 +81,24 @@ def shard(text: str) -> Shard:
         raise argparse.ArgumentTypeError(str(error)) from error
 
 
+def shard_of(arguments: argparse.Namespace) -> Shard | None:
+    """The shard of the work that is done, of which it warns where nobody asked; None for all."""
+    found: Shard | None = arguments.shard or Shard.of_environment()
+    if found is not None and found.of_array:
+        warn(f"{TASK} is {found.number + found.first}: one shard is done; --shard 0/1 does all")
+    return found
+
+
 def division_of(arguments: argparse.Namespace) -> Division:
     """How the arguments divide the work.
 
     Raises:
         InputError: Options that exclude each other.
     """
-    of_shard = arguments.shard or Shard.of_environment()
-    if of_shard is not None and of_shard.of_array:
-        warn(
-            f"{TASK} is {of_shard.number + of_shard.first}: one share is done; --shard 0/1 does all"
-        )
+    of_shard = shard_of(arguments)
     if arguments.anew and of_shard is not None:
         raise InputError(
-            "--anew", "excludes shares of the work", "Give --out another folder instead."
+            "--anew", "excludes shards of the work", "Give --out another folder instead."
         )
     resume = arguments.resume or arguments.workers is not None or arguments.dask is not None
     return Division(arguments.block, of_shard, resume, arguments.anew)
@@ -92,7 +108,7 @@ def workers_of(arguments: argparse.Namespace, count_units: Callable[[], int]) ->
     """The number of processes.
 
     Unless it is named, there are as many as threads where each has several units to do: they are
-    faster then, also on two cores (BENCHMARK.md). Otherwise there is one, as in a share of the
+    faster then, also on two cores (BENCHMARK.md). Otherwise there is one, as in a shard of the
     work, of which a batch system may start several on a machine.
 
     Args:
@@ -124,10 +140,8 @@ def executor_of(arguments: argparse.Namespace, workers: int) -> Iterator[Submits
             raise InputError("--workers", "excludes --dask", "Leave one of them out.")
         from derain.jobs.cluster import dask_executor  # imports Dask
 
-        with dask_executor(arguments.dask) as executor:
-            yield executor
-    elif workers > 1:
-        with WorkerPool(workers) as pool:
-            yield pool
+        with dask_executor(arguments.dask) as cluster:
+            yield cluster
     else:
-        yield None
+        with processes(workers) as pool:
+            yield pool

@@ -3,7 +3,7 @@
 import csv
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
@@ -120,6 +120,18 @@ def find_sequences(
         rate = rates[name] if name in rates else _recorded_rate(folder_above(folder) / "weather")
         sequences.append(SequenceOfFrames(name, frames, rate))
     return sequences
+
+
+def count_frames(frames: Iterable[Frame]) -> Contents:
+    """Counts the scans and points of some frames.
+
+    Raises:
+        InputError: As for :func:`count_frame`.
+    """
+    contents = Contents()
+    for frame in frames:
+        contents.add(count_frame(frame))
+    return contents
 
 
 def count_frame(frame: Frame) -> Contents:

@@ -96,9 +96,16 @@ class RainCounts:
             raise InputError(scan.name, "it has no labels", "Give its label file.")
         known = ~np.isin(scan.label, self.unknown)
         row, band = self._class_rows(scan.label[known]), band_of(scan.range[known])
-        counted = table_of((row, band, called_rain[known].astype(np.int64)), self.cells.shape)
-        self.cells += counted
-        self.per_scan.append(self._counts(counted))
+        self.add_cells(table_of((row, band, called_rain[known].astype(np.int64)), self.cells.shape))
+
+    def add_cells(self, cells: NDArray[np.int64]) -> None:
+        """Adds the points of one scan that are counted already.
+
+        Args:
+            cells: Of the shape of :attr:`cells`.
+        """
+        self.cells += cells
+        self.per_scan.append(self._counts(cells))
 
     def pooled(self) -> Counts:
         """Counts over the points of all scans."""

@@ -66,16 +66,32 @@ def score(
         InputError: A scan that cannot be read, one without labels, or a label that is no class of
             the card. A method that fails is noted in its scores.
     """
-    scorings = [_Scoring(card) for _ in methods]
+    counted = scorings(methods, scans, card, distinct, rain_rates)
+    return [scoring.scores() for scoring in counted]
+
+
+def scorings(
+    methods: Sequence[ScoredMethod],
+    scans: Iterable[Scan],
+    card: DataCard,
+    distinct: bool = False,
+    rain_rates: Sequence[float | None] | None = None,
+) -> "list[Scoring]":
+    """Counts the answers of every method to every scan; see :func:`score`."""
+    counts_of = [Scoring(card) for _ in methods]
     for scan, rate in zip(scans, repeat(None) if rain_rates is None else rain_rates, strict=False):
         counted = first_rows(scan) if distinct else np.arange(len(scan))
-        for method, scoring in zip(methods, scorings, strict=True):
+        for method, scoring in zip(methods, counts_of, strict=True):
             scoring.judge(method, scan, counted, rate)
-    return [scoring.scores() for scoring in scorings]
+    return counts_of
 
 
-class _Scoring:
-    """Counts the answers of one method, scan after scan."""
+class Scoring:
+    """Counts the answers of one method, scan after scan.
+
+    Args:
+        card: Data card of the scans.
+    """
 
     def __init__(self, card: DataCard) -> None:
         self.card = card
@@ -102,6 +118,16 @@ class _Scoring:
             for sensor, points in {"LiDAR": ~scan.radar, "radar": scan.radar}.items():
                 rows = known & points
                 self.by_sensor[sensor] += Counts.of(predicted[rows], rain[rows])
+
+    def add(self, later: "Scoring") -> None:
+        """Adds the counts of later scans, which may come from another process."""
+        self.counts.cells += later.counts.cells
+        self.counts.per_scan += later.counts.per_scan
+        for rate, counts in later.by_rain_rate.items():
+            self.by_rain_rate[rate] += counts
+        for sensor, counts in later.by_sensor.items():
+            self.by_sensor[sensor] += counts
+        self.failures |= later.failures
 
     def scores(self) -> Scores:
         """The counts so far."""

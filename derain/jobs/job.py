@@ -10,9 +10,10 @@ import shutil
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 from derain.errors import InputError
 from derain.files.atomic import replacing, temporary_folder, writing
@@ -23,6 +24,8 @@ from derain.jobs.unit import Unit
 FOLDER = ".derain"
 JOB, UNITS, RECORDS = "job.json", "units.json", "units"
 
+UnitT = TypeVar("UnitT", bound=Unit)
+
 
 @dataclass(frozen=True)
 class Job:
@@ -32,7 +35,7 @@ class Job:
         folder: The folder of the results.
         options: Texts, numbers, true or false by name, among them the command and derain's version:
             all of what the results depend on but the inputs.
-        shards: How many shares it was begun in, and what a batch system calls the first of them;
+        shards: How many shards it was begun in, and what a batch system calls the first of them;
             None where it was begun as a whole.
     """
 
@@ -49,7 +52,7 @@ class Job:
         Args:
             folder: The folder of the results, made if missing.
             options: The options.
-            shard: The share that is done now; None for all of it.
+            shard: The shard that is done now; None for all of it.
             anew: Whether the records of another job are removed; its results stay until they are
                 written anew.
 
@@ -92,7 +95,7 @@ class Job:
         """Whether a folder has a job."""
         return (folder / FOLDER / JOB).exists()
 
-    @property
+    @cached_property
     def fingerprint(self) -> str:
         """Of its options, 16 hexadecimal digits."""
         return sha256(json.dumps(self.options, sort_keys=True).encode()).hexdigest()[:16]
@@ -105,6 +108,15 @@ class Job:
         """
         listed = [[unit.id, unit.size, unit.inputs] for unit in units]
         _write(self.folder / FOLDER / UNITS, listed)
+
+    def shard_of(self, units: list[UnitT], shard: Shard | None) -> list[UnitT]:
+        """The units of a shard, in their order.
+
+        Args:
+            units: All units.
+            shard: The shard; None for all of them.
+        """
+        return units if shard is None else shard.within(self.shards).of(units)
 
     def listed(self) -> list[Unit]:
         """The units of the last command that went on with it."""
@@ -151,20 +163,27 @@ class Job:
 
     def _refuse_other(self, begun: "Job") -> None:
         """Refuses to go on with a job that was begun by other options."""
-        names = [*begun.options, *(name for name in self.options if name not in begun.options)]
-        changed = [name for name in names if begun.options.get(name) != self.options.get(name)]
-        if not changed:
-            return
-        differences = ", ".join(
-            f"{name} was {begun.options.get(name, 'not there')} and is "
-            f"{self.options.get(name, 'not there')}"
-            for name in changed
-        )
-        raise InputError(
-            self.folder,
-            f"was begun by other options: {differences}",
-            "Give --out another folder, or --anew to have all of it done again.",
-        )
+        if changed := differences(begun.options, self.options):
+            raise InputError(
+                self.folder,
+                f"was begun by other options: {changed}",
+                "Give --out another folder, or --anew to have all of it done again.",
+            )
+
+
+def differences(begun: Mapping[str, Any], now: Mapping[str, Any]) -> str:
+    """Names the options that were others where something began; empty where none was.
+
+    Args:
+        begun: The options by which it began.
+        now: Those of now.
+    """
+    names = [*begun, *(name for name in now if name not in begun)]
+    return ", ".join(
+        f"{name} was {begun.get(name, 'not there')} and is {now.get(name, 'not there')}"
+        for name in names
+        if begun.get(name) != now.get(name)
+    )
 
 
 def _write(path: Path, content: Any) -> None:

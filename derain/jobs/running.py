@@ -175,6 +175,22 @@ def run(
         yield from _by(executor, task, units)
 
 
+def completed(task: Task[UnitT, ResultT], units: Sequence[UnitT]) -> list[ResultT] | None:
+    """The results of all units of a job, whoever did them; None while one is to be done.
+
+    Args:
+        task: What is done of each.
+        units: All units of the job.
+    """
+    results: list[ResultT] = []
+    for unit in units:
+        done = task.done(unit)
+        if done is None:
+            return None
+        results += done
+    return results
+
+
 def _by(
     executor: Submits, task: Task[UnitT, ResultT], units: Sequence[UnitT]
 ) -> Iterator[UnitResult[UnitT, ResultT]]:

@@ -2,35 +2,49 @@
 
 manifest.json       campaign, split, rain rate of each sequence, SHA-256 of each file
 sequences/000/...   see :mod:`derain.simulation.sequence`
+.derain/            records of the sequences that are simulated, see :mod:`derain.jobs.job`
 
-A sequence's folder appears when it is complete, so that an interrupted run can be taken up again.
-Each sequence is drawn with a random generator of its own, so that neither an interruption nor the
-number of workers changes a byte. Of two runs on one folder the second waits for the first.
+A sequence is a unit of a job, and its folder appears when it is complete, so that an interrupted
+run can be taken up again. Each sequence is drawn with a random generator of its own, so that
+neither an interruption nor processes, shards and machines change a byte. Of two runs on one folder
+the second waits for the first; shards of one run do not wait for each other.
 """
 
 import os
 import shutil
 import sys
-from collections.abc import Generator, Iterator, Mapping
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import ExitStack, closing, contextmanager, suppress
-from functools import partial
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from tqdm import tqdm
 
 from derain.errors import InputError
-from derain.files.atomic import lock, remove_abandoned
+from derain.files.atomic import lock, remove_abandoned, temporary_folder, writing
+from derain.jobs.job import FOLDER, Job, differences
+from derain.jobs.running import Submits, Task, Work, completed, run
+from derain.jobs.shard import Shard
+from derain.jobs.unit import Unit
 from derain.simulation.campaign import SplitSequences
-from derain.simulation.manifest import MANIFEST, checksums, read_manifest, write_manifest
+from derain.simulation.manifest import (
+    MANIFEST,
+    checksums,
+    parameters_of,
+    read_manifest,
+    write_manifest,
+)
+from derain.system.notices import warn
 from derain.system.open3d_import import import_open3d
-from derain.system.workers import worker_pool
 
 SEQUENCES = "sequences"
 
+# The checksums of a sequence's files by their paths, or why it could not be simulated.
+Outcome = dict[str, str] | InputError
 
-def ensure_track(root: Path, campaign: SplitSequences, workers: int = 1) -> None:
+
+def ensure_track(root: Path, campaign: SplitSequences, executor: Submits | None = None) -> None:
     """Simulates a data set for a program's own use, unless the folder already holds this very one.
 
     If the folder holds a data set that this function made of another campaign, it is replaced. One
@@ -39,97 +53,198 @@ def ensure_track(root: Path, campaign: SplitSequences, workers: int = 1) -> None
     Args:
         root: Folder of the data set.
         campaign: What is to be in it.
-        workers: Processes that share the work.
+        executor: Simulates the sequences; None does it in this process.
 
     Raises:
         InputError: As :func:`simulate_track`.
     """
-    _simulate(root, campaign, workers, keep=False)
+    _simulate(root, campaign, executor, None, keep=False)
 
 
-def simulate_track(root: Path, campaign: SplitSequences, workers: int = 1) -> None:
+def simulate_track(
+    root: Path,
+    campaign: SplitSequences,
+    executor: Submits | None = None,
+    shard: Shard | None = None,
+) -> bool:
     """Simulates a data set, or what is missing of it.
 
     Args:
         root: Folder to write: a new or an empty one, or one that holds part of this very data set.
         campaign: What to simulate.
-        workers: Processes that share the work.
+        executor: Simulates the sequences; None does it in this process.
+        shard: The shard of the sequences that is simulated; None for all. Whoever does the last
+            shard completes the manifest.
+
+    Returns:
+        Whether the data set is complete; False while other shards are to be simulated.
 
     Raises:
-        InputError: The folder holds something else or cannot be written, or Open3D cannot be
-            imported. What was complete by then stays, and nothing half-written.
+        InputError: The folder holds something else or cannot be written, Open3D cannot be imported,
+            or a sequence cannot be simulated. The others are simulated then, and nothing is
+            half-written.
     """
-    _simulate(root, campaign, workers, keep=True)
+    return _simulate(root, campaign, executor, shard, keep=True)
 
 
-def _simulate(root: Path, campaign: SplitSequences, workers: int, *, keep: bool) -> None:
-    """Simulates the sequences that are missing.
+def _simulate(
+    root: Path,
+    campaign: SplitSequences,
+    executor: Submits | None,
+    shard: Shard | None,
+    *,
+    keep: bool,
+) -> bool:
+    """Simulates the sequences that are missing; see :func:`simulate_track`.
 
     Args:
         root: Folder of the data set.
         campaign: What to simulate.
-        workers: Processes that share the work.
+        executor: Simulates the sequences.
+        shard: The shard that is simulated.
         keep: Whether the data set is a person's; otherwise :func:`ensure_track` may replace it.
     """
     campaign = campaign.resolved()  # reports a wrong file first
     description = {**campaign.description, "keep": keep}
-    with _alone(root):
+    with _locked(root, shared=shard is not None):
         if not keep:
             _remove_another(root, campaign)
         there = read_manifest(root)
         _refuse_others(root, there, campaign)
         if "files" in there and all((root / SEQUENCES / name).is_dir() for name in campaign.names):
-            return
+            return True
         import_open3d()  # raises where it is missing, before anything is written
-        files: dict[str, str] = {}
-        with _writing(root):
-            # The manifest comes first: a folder with content but without one is refused.
+        # The manifest comes first: a folder with content but without one is refused.
+        if there != description:
             write_manifest(root, description)
-            (root / SEQUENCES).mkdir(exist_ok=True)
-            with closing(_complete_sequences(root, campaign, workers)) as complete:
-                for written in complete:
-                    files |= written
-            write_manifest(root, {**description, "files": files})
+        # Absolute, because other processes may work in another folder.
+        work = SequenceWork(root.absolute(), campaign)
+        job = Job.begin(work.root, {"command": "simulate", **parameters_of(description)}, shard)
+        units = [Unit(id=name, size=1, inputs="") for name in campaign.names]
+        job.list_units(units)
+        task = Task(job, work)
+        _run(task, job.shard_of(units, shard), executor)
+        outcomes = completed(task, units)
+        if outcomes is None:
+            return False
+        files: dict[str, str] = {}
+        for checksums_of_sequence in outcomes:
+            assert isinstance(checksums_of_sequence, dict)  # none of them failed
+            files |= checksums_of_sequence
+        write_manifest(root, {**description, "files": files})
+        return True
+
+
+def _run(task: Task[Unit, Outcome], units: Sequence[Unit], executor: Submits | None) -> None:
+    """Simulates sequences, and warns of each that cannot be simulated.
+
+    Raises:
+        InputError: There was one.
+    """
+    failures: list[InputError] = []
+    results = run(task, units, executor)
+    shown = tqdm(results, total=len(units), desc="simulating", unit="sequence", disable=None)
+    for each in shown:
+        if isinstance(each.result, InputError):
+            warn(f"{each.unit.id}: {each.result}")
+            failures.append(each.result)
+    if failures:
+        raise InputError(
+            failures[0].subject,
+            f"{failures[0].reason}, so that {len(failures):,} of {len(units):,} sequences could "
+            "not be simulated",
+            f"{failures[0].remedy} The same command goes on with them.",
+        )
+
+
+@dataclass(frozen=True)
+class SequenceWork(Work[Unit, Outcome]):
+    """Simulates sequences, whose names are the ids of the units.
+
+    Attributes:
+        root: Folder of the data set.
+        campaign: What is simulated.
+    """
+
+    root: Path
+    campaign: SplitSequences
+
+    def check(self) -> None:
+        """Refuses a process that cannot import Open3D."""
+        import_open3d()
+
+    def do(self, unit: Unit) -> Iterator[Outcome]:
+        """Simulates a sequence, unless it is there; yields the checksums of its files."""
+        folder = self.root / SEQUENCES / unit.id
+        if not folder.exists():
+            with writing(self.root), temporary_folder(folder.parent) as temporary:
+                self.campaign.write(temporary / unit.id, unit.id)
+                self._put_in_place(temporary / unit.id, folder)
+        yield checksums(folder, self.root)
+
+    def is_there(self, unit: Unit) -> bool:
+        """Whether the sequence is there."""
+        return (self.root / SEQUENCES / unit.id).is_dir()
+
+    def failed(self, unit: Unit, error: InputError) -> Iterator[Outcome]:
+        """Why a sequence could not be simulated."""
+        yield error
+
+    def error_of(self, result: Outcome) -> InputError | None:
+        """Why a sequence could not be simulated; None where it was."""
+        return result if isinstance(result, InputError) else None
+
+    def to_json(self, result: Outcome) -> Any:
+        """The checksums, as they are."""
+        return result
+
+    def from_json(self, unit: Unit, written: Any) -> Outcome:
+        """The checksums, as they are."""
+        return dict(written)
+
+    @staticmethod
+    def _put_in_place(complete: Path, folder: Path) -> None:
+        try:
+            complete.rename(folder)
+        except OSError:
+            if not folder.is_dir():  # else another process was quicker, with the same bytes
+                raise
 
 
 def _remove_another(root: Path, campaign: SplitSequences) -> None:
     """Removes the data set of another campaign, unless it is a person's."""
     there = read_manifest(root)
     if there and not there.get("keep") and not _describes(there, campaign):
-        with _writing(root):
+        with writing(root):
             # The manifest goes last. Without it the folder would be taken for somebody else's,
             # should this run be killed in between; the sequences may then be gone already.
-            if (root / SEQUENCES).exists():
-                shutil.rmtree(root / SEQUENCES)
+            for name in (SEQUENCES, FOLDER):
+                if (root / name).exists():
+                    shutil.rmtree(root / name)
             (root / MANIFEST).unlink()
 
 
 @contextmanager
-def _alone(root: Path) -> Iterator[None]:
-    """Makes the folder and locks it, so that only one process at a time simulates in it."""
+def _locked(root: Path, *, shared: bool) -> Iterator[None]:
+    """Makes the folder and locks it, so that only one process at a time simulates in it.
+
+    Args:
+        root: The folder.
+        shared: Whether the shards of one run may simulate in it at the same time.
+    """
     if root.exists() and not root.is_dir():
         raise InputError(root, "is not a folder", "Name a new or empty folder.")
-    with _writing(root):
+    with writing(root):
         root.mkdir(parents=True, exist_ok=True)
     with ExitStack() as held:
         with suppress(OSError):  # without locks two runs on one folder do not wait for each other
             folder = os.open(root, os.O_RDONLY)
             held.callback(os.close, folder)
-            if not lock(folder, wait=False):
+            if not lock(folder, wait=False, shared=shared):
                 print(f"derain: waits for another run that simulates in {root}", file=sys.stderr)
-                lock(folder, wait=True)
+                lock(folder, wait=True, shared=shared)
         remove_abandoned(root)
         yield
-
-
-@contextmanager
-def _writing(root: Path) -> Iterator[None]:
-    """Turns the system's refusal to write into an error that a user can act on."""
-    try:
-        yield
-    except OSError as error:
-        reason = f"cannot be written ({error.strerror or error})"
-        raise InputError(root, reason, "Choose a folder that is writable and has room.") from error
 
 
 def _describes(manifest: Mapping[str, Any], campaign: SplitSequences) -> bool:
@@ -138,45 +253,9 @@ def _describes(manifest: Mapping[str, Any], campaign: SplitSequences) -> bool:
 
 def _refuse_others(root: Path, there: Mapping[str, Any], campaign: SplitSequences) -> None:
     if there and not _describes(there, campaign):
-        reason = "holds a simulated data set of other parameters or of another version of derain"
+        changed = differences(parameters_of(there), parameters_of(campaign.description))
+        reason = f"holds a simulated data set of other parameters: {changed}"
         raise InputError(root, reason, "Name another folder, or delete this one.")
     if not there and any(root.iterdir()):
         reason = "holds something other than a simulated data set"
         raise InputError(root, reason, "Name a new or empty folder.")
-
-
-def _complete_sequences(
-    root: Path, campaign: SplitSequences, workers: int
-) -> Generator[dict[str, str], None, None]:
-    """Checksums of every sequence, made where it is missing, in ascending order."""
-    complete = partial(_complete_sequence, root, campaign)
-    count = len(campaign.names)
-    progress = partial(tqdm, total=count, desc="simulating", unit="sequence", disable=None)
-    if workers == 1:
-        yield from progress(map(complete, campaign.names))
-        return
-    try:
-        with worker_pool(workers) as pool:
-            yield from progress(pool.map(complete, campaign.names))
-    except BrokenProcessPool as error:
-        reason = "a worker was killed, perhaps for want of memory"
-        raise InputError(root, reason, "Try again with fewer workers.") from error
-    finally:
-        for name in campaign.names:  # a worker that was killed leaves what it had begun
-            shutil.rmtree(_unfinished(root, name), ignore_errors=True)
-
-
-def _unfinished(root: Path, name: str) -> Path:
-    return root / SEQUENCES / f".{name}"
-
-
-def _complete_sequence(root: Path, campaign: SplitSequences, name: str) -> dict[str, str]:
-    folder, unfinished = root / SEQUENCES / name, _unfinished(root, name)
-    if not folder.exists():
-        shutil.rmtree(unfinished, ignore_errors=True)  # left behind by a run that was killed
-        try:
-            campaign.write(unfinished, name)
-            unfinished.rename(folder)
-        finally:
-            shutil.rmtree(unfinished, ignore_errors=True)
-    return checksums(folder, root)

@@ -23,8 +23,9 @@ MAKER = "derain.simulation"
 # Parts of its split.
 SPLIT_PARTS = ("train", "validation", "test")
 
-# Key of the rain rate of each sequence.
-RAIN_RATE = "rain_rate_mm_h"
+# Keys of the sequences of each part, of the rain rate of each sequence, of the checksums by path,
+# and of whether a person asked for the data set.
+SPLIT, RAIN_RATE, FILES, KEEP = "split", "rain_rate_mm_h", "files", "keep"
 
 # In bytes. The entry of a file takes 130, so that half a million files fit.
 LARGEST_MANIFEST = 2**26
@@ -49,10 +50,10 @@ def read_manifest(root: Path) -> dict[str, Any]:
         return {}
     values = document.members()
     parsers = {
-        "split": lambda parts: parts.record(dict.fromkeys(SPLIT_PARTS, Entry.texts), SPLIT_PARTS),
+        SPLIT: lambda parts: parts.record(dict.fromkeys(SPLIT_PARTS, Entry.texts), SPLIT_PARTS),
         RAIN_RATE: rates_of_sequences,
-        "files": lambda files: files.each(Entry.text),
-        "keep": Entry.truth,
+        FILES: lambda files: files.each(Entry.text),
+        KEEP: Entry.truth,
     }
     for key, read in parsers.items():
         if key in values:
@@ -68,6 +69,24 @@ def manifest_of(root: Path) -> dict[str, Any]:
     """
     root = root.absolute()
     return next(filter(None, map(read_manifest, (root, *root.parents[:3]))), {})
+
+
+def parameters_of(manifest: Mapping[str, Any], within: str = "") -> dict[str, Any]:
+    """What the data set was made from, each value by its path, such as ``campaign.sensor.rows``.
+
+    Args:
+        manifest: Content of a manifest.
+        within: Path of what it is part of, with a dot at its end.
+    """
+    found: dict[str, Any] = {}
+    for name, value in manifest.items():
+        if within + name in (SPLIT, RAIN_RATE, FILES, KEEP):
+            continue
+        if isinstance(value, dict):
+            found |= parameters_of(value, f"{within}{name}.")
+        else:
+            found[within + name] = value
+    return found
 
 
 def rates_of_sequences(entry: Entry) -> dict[str, float]:

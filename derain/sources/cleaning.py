@@ -7,13 +7,11 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-import derain
 from derain.errors import InputError
 from derain.jobs.job import Job
 from derain.jobs.running import Submits, Task, UnitResult, run
 from derain.sources.clean_sink import CleanSink
 from derain.sources.cleaned_scan import CleanedScan, ScanOutcome, counts
-from derain.sources.file_frame import FileFrame
 from derain.sources.folders import GivenScans, source_of
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
@@ -125,14 +123,13 @@ def clean(
     failures: list[InputError] = []
     before = 0
     with nullcontext(sink) if isinstance(sink, CleanSink) else CleanSink(sink, source) as opened:
-        work = UnitCleaning(method, opened.for_scans, most_removed, measured, method.fingerprint())
+        work = UnitCleaning(method, method.fingerprint(), opened.for_scans, most_removed, measured)
         division = Division(resume=True) if division is None and executor is not None else division
-        if division is not None and _keeps_records(source, division, opened.folder):
+        if division is not None and division.keeps_records(source, opened.folder):
             job = _job(source, work, opened, division)
             units = units_of(source, method, division.block)
             job.list_units(units)
-            if division.shard is not None:
-                units = division.shard.within(job.shards).of(units)
+            units = job.shard_of(units, division.shard)
             outcomes = _counted(run(Task(job, work), units, executor), opened)
         else:
             units = [whole(source)]
@@ -175,27 +172,12 @@ def _counted(
         yield result
 
 
-def _keeps_records(source: Source, division: Division, folder: Path) -> bool:
-    """Whether there is a record of each unit: where it is asked for, or begun, or takes long."""
-    asked = division.resume or division.anew or division.shard is not None
-    return asked or len(source) > division.block or Job.is_begun(folder)
-
-
 def _job(source: Source, work: UnitCleaning, sink: CleanSink, division: Division) -> Job:
     """Begins a job, or goes on with the one of the folder, by all that the results depend on."""
-    parameters = work.method.as_dict()
-    files = [frame for frame in source if isinstance(frame, FileFrame)]
     options = {
-        "command": "run",
-        "derain": derain.__version__,
-        **parameters,
-        "method": Path(parameters["method"]).name,
-        "fingerprint": work.fingerprint,
+        **work.options("run", source, division.block),
         **sink.options,
         "most_removed": work.most_removed,
         "weather": "every scan" if work.measured is None else "some scans",
-        "block": division.block,
-        "columns": sorted({",".join(frame.columns) for frame in files}),
-        "intensity_scale": sorted({frame.intensity_scale for frame in source}),
     }
     return Job.begin(sink.folder, options, division.shard, division.anew)

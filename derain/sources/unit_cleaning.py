@@ -1,21 +1,19 @@
 """Cleans the scans of one unit: judges them, measures their weather, and writes them."""
 
 from collections.abc import Callable, Collection, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from derain.errors import InputError
 from derain.files.reading import reading
-from derain.jobs.running import Work
 from derain.sources.clean_sink import CleanSink
 from derain.sources.cleaned_scan import CleanedScan, ScanOutcome, unpacked
 from derain.sources.frame import Frame, time_of
 from derain.sources.judgement import Judgement
-from derain.sources.judging import judgements
 from derain.sources.method import Method
 from derain.sources.source import Frames, Source
+from derain.sources.unit_judging import UnitJudging
 from derain.sources.units import FrameUnit
 from derain.system.stopwatch import Stopwatch
 from derain.views.scan_issues import (
@@ -31,31 +29,18 @@ OnJudgement = Callable[[Judgement], None]
 
 
 @dataclass(frozen=True)
-class UnitCleaning(Work[FrameUnit, ScanOutcome]):
+class UnitCleaning(UnitJudging[ScanOutcome]):
     """Cleans the scans of one unit after the other.
 
     Attributes:
-        method: What judges them.
         sink_for: Makes the sink of a unit.
         most_removed: Scans with a greater share of rain in their valid points are not written.
         measured: Keys of the scans whose weather is measured; None measures all.
-        fingerprint: That of the method where the job began.
     """
 
-    method: Method
     sink_for: Callable[[Source], CleanSink]
     most_removed: float
     measured: Collection[str] | None
-    fingerprint: str
-
-    def check(self) -> None:
-        """Refuses a method that is another one here, such as a model's file that has changed."""
-        if self.method.fingerprint() != self.fingerprint:
-            raise InputError(
-                str(self.method.as_dict()["method"]),
-                "is not the same here as where the run began",
-                "Copy the file to every machine.",
-            )
 
     def do(self, unit: FrameUnit) -> Iterator[ScanOutcome]:
         """Cleans the scans of a unit."""
@@ -75,28 +60,18 @@ class UnitCleaning(Work[FrameUnit, ScanOutcome]):
         Yields:
             What became of each scan.
         """
-        own, ready = set(unit.frames), list[ScanOutcome]()
-
-        @contextmanager
-        def catching(frame: Frame) -> Iterator[None]:
+        for frame, answer in self.judged(unit):
+            if isinstance(answer, InputError):
+                yield ScanOutcome(frame, [], error=answer)
+                continue
+            _, judgement, stopwatch = answer
+            on_judgement(judgement)
             try:
                 with reading(Path(frame.name)):  # which names the file where the memory is full
-                    yield
+                    outcome = self._cleaned(frame, judgement, stopwatch, sink)
             except InputError as error:
-                if frame in own:
-                    ready.append(ScanOutcome(frame, [], error=error))
-
-        frames = (*unit.before, *unit.frames, *unit.after)
-        for frame, judgement, stopwatch in judgements(self.method, frames, catching):
-            yield from _drained(ready)
-            if frame in own:
-                on_judgement(judgement)
-                with catching(frame):
-                    ready.append(self._cleaned(frame, judgement, stopwatch, sink))
-                yield from _drained(ready)
-            if unit.after and frame is unit.frames[-1]:
-                break  # those after it need no answer
-        yield from _drained(ready)
+                outcome = ScanOutcome(frame, [], error=error)
+            yield outcome
 
     def is_there(self, unit: FrameUnit) -> bool:
         """Whether all files and bags of the unit are there."""
@@ -157,12 +132,6 @@ class UnitCleaning(Work[FrameUnit, ScanOutcome]):
             warnings=[issue.detail for issue in issues],
         )
         return ScanOutcome(frame, issues, figures, time_of(frame), measured)
-
-
-def _drained(outcomes: list[ScanOutcome]) -> Iterator[ScanOutcome]:
-    """Takes outcomes from the beginning of a list, until it is empty."""
-    while outcomes:
-        yield outcomes.pop(0)
 
 
 def _issues(method: Method, judgement: Judgement, most_removed: float) -> list[ScanIssue]:

@@ -1,10 +1,13 @@
 """The units that a source splits into: recordings, bags, or blocks of scans of long recordings."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from hashlib import sha256
+from pathlib import Path
+from typing import Self
 
 from derain.errors import InputError
+from derain.jobs.job import Job
 from derain.jobs.shard import Shard
 from derain.jobs.unit import Unit
 from derain.sources.bag_frame import BagFrame
@@ -34,6 +37,16 @@ class Division:
     resume: bool = False
     anew: bool = False
 
+    def keeps_records(self, source: Sequence[Frame], folder: Path) -> bool:
+        """Whether there is a record of each unit: it is asked for, or begun, or takes long.
+
+        Args:
+            source: The scans.
+            folder: The folder of the results.
+        """
+        asked = self.resume or self.anew or self.shard is not None
+        return asked or len(source) > self.block or Job.is_begun(folder)
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FrameUnit(Unit):
@@ -48,6 +61,16 @@ class FrameUnit(Unit):
     frames: tuple[Frame, ...]
     before: tuple[Frame, ...] = ()
     after: tuple[Frame, ...] = ()
+
+    def map(self, change: Callable[[Frame], Frame]) -> Self:
+        """The same of other frames, in the same order.
+
+        Args:
+            change: Makes each from one that there is.
+        """
+        parts = (self.frames, self.before, self.after)
+        frames, before, after = (tuple(map(change, part)) for part in parts)
+        return replace(self, frames=frames, before=before, after=after)
 
 
 def units_of(source: Sequence[Frame], method: Method, block: int = BLOCK) -> list[FrameUnit]:

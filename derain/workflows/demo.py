@@ -21,6 +21,7 @@ from derain.export.methods import load_method
 from derain.files import DEFAULT_COLUMNS
 from derain.files.atomic import require_writable
 from derain.files.labels import LABEL
+from derain.jobs.workers import processes
 from derain.pictures.scan_pictures import before_after_figure, comparison_figure, save
 from derain.simulation.campaign import Campaign, partition
 from derain.simulation.dataset import simulate_track
@@ -115,7 +116,8 @@ def run_demo(config: DemoConfig, show: Show = show_nothing) -> Bench:
     steps = Steps(show, config.steps)
     clean_given_scans(config.scan or Path(EXAMPLE), config.columns, config.out / "yours", steps)
     steps.begin(f"Simulation: rain in {len(config.streets.names)} streets")
-    simulate_track(config.data, config.streets, config.workers)
+    with processes(config.workers) as executor:
+        simulate_track(config.data, config.streets, executor)
     steps.end(f"{len(config.streets.names) * config.streets.scans} scans in {config.data}")
     data = labelled_scans([config.data], card_of([config.data], None), Loading())
     _tune(config, data, steps)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from derain.annotation.teach import TAUGHT_CARD, labels_of
+from derain.annotation.labelling import TAUGHT_CARD, labels_of
 from derain.cards.card import DataCard, load_card
 from derain.cards.known import label_of, layouts_for
 from derain.datamodules.taught import Taught
@@ -16,6 +16,7 @@ from derain.errors import InputError
 from derain.evaluation.answers import NOT_KNOWN, RAIN, Answers, AnswersOfScan, answer_of, total
 from derain.evaluation.counts import SCORES
 from derain.evaluation.text_tables import markdown_table, number_text
+from derain.evaluation.truth_record import TruthRecord
 from derain.pictures.answers import answers_figure
 from derain.pictures.scan_pictures import before_after_figure, save
 from derain.recordings.persistence import PersistenceDerainer
@@ -28,7 +29,6 @@ from derain.sources.reader import FrameReader
 from derain.sources.source import Source
 from derain.sources.spread import evenly_spaced
 from derain.workflows.learn_report import LearnResults
-from derain.workflows.teaching import TruthRecord
 
 # Returns which points of a scan of N points are rain, bool (N,).
 Student = Callable[[Scan], NDArray[np.bool_]]

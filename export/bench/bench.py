@@ -1,8 +1,8 @@
 """Runs a bench: every method on the same scans, each timed alone."""
 
 import platform
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from tqdm import tqdm
 from derain.cards.card import DataCard, load_card
 from derain.cards.rain_found import warn_without_rain
 from derain.errors import reason_of
-from derain.evaluation.scores import ScoredMethod, score
+from derain.evaluation.scores import ScoredMethod, Scoring, scorings
 from derain.export.bench.bench_entries import BenchEntry, GivenMethod, TimedMethod, bench_entries
 from derain.export.bench.cost import Timing, measure_cost
 from derain.export.bench.labelled_frames import LabelledFrames
@@ -26,15 +26,23 @@ from derain.export.runtimes.session import DEFAULT_RUNTIME, FLOAT32_PRECISION, R
 from derain.files import DEFAULT_COLUMNS
 from derain.filters import PointFilter
 from derain.filters.point_filter import filter_view, rain_among, rows_of
+from derain.jobs.workers import each_by
 from derain.scan import Scan
 from derain.sources.folders import GivenScans, source_of
+from derain.sources.frame import Frame
 from derain.sources.spread import evenly_spaced
 from derain.sources.training_record import training_overlap
+from derain.sources.units import BLOCK
 from derain.spec import Spec
+from derain.system.cores import threads_of
 from derain.system.extras import MATPLOTLIB, MissingExtraError, require
-from derain.system.notices import Notices, warn
+from derain.system.notices import Notice, Notices, warn
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
+
+# Name of a scan, what is odd about it, and the title of the method to which that matters.
+IssuesOfScan = tuple[str, Iterable[Notice], str]
+WarnOf = Callable[[str, Iterable[Notice], str], None]
 
 
 @dataclass(frozen=True)
@@ -175,7 +183,11 @@ def bench(
 
 
 def run_bench(
-    methods: Sequence[BenchEntry], data: LabelledFrames, effort: Effort, command: str
+    methods: Sequence[BenchEntry],
+    data: LabelledFrames,
+    effort: Effort,
+    command: str,
+    workers: int = 1,
 ) -> Bench:
     """Scores every method on every scan, and measures what each costs alone.
 
@@ -184,6 +196,7 @@ def run_bench(
         data: The scans.
         effort: How much is timed, and the seed.
         command: The command or call of this bench, for its report.
+        workers: Processes that score; each method is timed alone.
 
     Raises:
         InputError: A scan that cannot be read. The row of a method that fails states so.
@@ -194,13 +207,12 @@ def run_bench(
         warn(note)
     timed_on = evenly_spaced(data.frames, effort.timed)
     timing = Timing(timed_on, effort.threads, effort.repeats, data.intensity_scale)
-    scores = score(
-        scored_methods(methods, effort.threads),
-        _scans(methods, data, notices),
-        data.card,
-        data.distinct,
-        list(map(data.rain_rate, data.frames)),
-    )
+    if workers == 1:
+        shown = tqdm(data.frames, desc="scoring", unit="scan", disable=None)
+        scored = _scored(methods, data, effort.threads, shown, notices.warn)
+    else:
+        scored = _scored_by(workers, methods, data, effort.threads, notices.warn)
+    scores = [scoring.scores() for scoring in scored]
     rained = any(one.pooled.true_positive + one.pooled.false_negative for one in scores)
     warn_without_rain(rained, data.card)
     costs = [
@@ -250,14 +262,67 @@ def _overlap(method: BenchEntry, data: LabelledFrames) -> str | None:
     return training_overlap(method.title, spec, data.card, data.frames)
 
 
-def _scans(methods: Sequence[BenchEntry], data: LabelledFrames, notices: Notices) -> Iterator[Scan]:
-    """Reads the scans one by one, and warns where one does not suit a method."""
-    for frame in tqdm(data.frames, desc="scoring", unit="scan", disable=None):
-        scan = data.read(frame)
-        for method in methods:
-            if method.spec_or_filter is not None:
-                notices.warn(frame.name, method.spec_or_filter.issues(scan), method.title)
-        yield scan
+def _scored(
+    methods: Sequence[BenchEntry],
+    data: LabelledFrames,
+    threads: int,
+    frames: Iterable[Frame],
+    warn_of: WarnOf,
+) -> list[Scoring]:
+    """Scores every method on the scans.
+
+    Args:
+        methods: The methods.
+        data: The scans.
+        threads: Threads of views and networks.
+        frames: The same scans, perhaps with a progress bar.
+        warn_of: Receives where a scan does not suit a method.
+    """
+
+    def scans() -> Iterator[Scan]:
+        for frame in frames:
+            scan = data.read(frame)
+            for method in methods:
+                if method.spec_or_filter is not None:
+                    warn_of(frame.name, method.spec_or_filter.issues(scan), method.title)
+            yield scan
+
+    rain_rates = list(map(data.rain_rate, data.frames))
+    ready = scored_methods(methods, threads)
+    return scorings(ready, scans(), data.card, data.distinct, rain_rates)
+
+
+def _scored_by(
+    workers: int,
+    methods: Sequence[BenchEntry],
+    data: LabelledFrames,
+    threads: int,
+    warn_of: WarnOf,
+) -> list[Scoring]:
+    """The same by several processes, which share the threads."""
+    starts = range(0, len(data.frames), BLOCK)
+    blocks = [replace(data, frames=data.frames[start : start + BLOCK]) for start in starts]
+    threads_of_each = max(threads_of(threads) // workers, 1)
+    parts = each_by(workers, partial(_scored_block, methods, threads_of_each), blocks)
+    totals = [Scoring(data.card) for _ in methods]
+    for scored, found in tqdm(parts, "scoring", len(blocks), unit="block", disable=None):
+        for total, part in zip(totals, scored, strict=True):
+            total.add(part)
+        for issues in found:
+            warn_of(*issues)
+    return totals
+
+
+def _scored_block(
+    methods: Sequence[BenchEntry], threads: int, data: LabelledFrames
+) -> tuple[list[Scoring], list[IssuesOfScan]]:
+    """Scores a block of scans, in a process of its own, and finds where they suit no method."""
+    found: list[IssuesOfScan] = []
+
+    def note(scan: str, issues: Iterable[Notice], method: str) -> None:
+        found.append((scan, list(issues), method))
+
+    return _scored(methods, data, threads, data.frames, note), found
 
 
 def _changed(method: BenchEntry, timing: Timing, data: LabelledFrames) -> dict[str, Any]:

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from window_method import Between, Dimmer
 
+from derain.annotation.labelling import labels_of
 from derain.annotation.manifest import CARD, LABELS, TAUGHT_MANIFEST, Manifest
-from derain.annotation.teach import labels_of, teach
+from derain.annotation.teach import teach
 from derain.cards.card import load_card
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
@@ -73,16 +74,13 @@ def test_labels_are_what_the_method_says(
     make: Callable[[], Between | FilterDerainer], make_drive: MakeDrive, tmp_path: Path
 ) -> None:
     drive, out = make_drive(), tmp_path / "taught"
-    told = []
-    manifest = teach(make(), of(drive), out, watch=lambda answer, labels: told.append(labels))
+    manifest = teach(make(), of(drive), out)
     keys = [scan.key for scan in manifest.scans]
-    unlabelled = named_frames([drive])
-    for labels, (frame, judgement, _) in zip(told, judgements(make(), unlabelled), strict=True):
-        np.testing.assert_array_equal(labels, labels_of(judgement))
+    for frame, judgement, _ in judgements(make(), named_frames([drive])):
         assert (frame.key in keys) == bool(judgement.answered.any())
         if frame.key in keys:
             written = read_labels(out / LABELS / f"{frame.key}.label", POINTS)
-            np.testing.assert_array_equal(written, labels)
+            np.testing.assert_array_equal(written, labels_of(judgement))
     # Of the first and the last the method that looks before and after knows nothing.
     numbers = range(1, 5) if isinstance(make(), Between) else range(6)
     assert keys == [f"{number:06d}" for number in numbers]

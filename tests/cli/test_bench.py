@@ -103,6 +103,30 @@ def test_intensities_of_another_unit_are_warned_of_and_scaled(
     assert scaled == whole != small
 
 
+def test_processes_score_what_one_does_and_warn_of_the_same(
+    run_derain, root: Path, tmp_path: Path, onnx_model: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bench, "BLOCK", 2)  # of the three scans
+    for path in root.rglob("*.bin"):
+        points = np.fromfile(path, np.float32).reshape(-1, 4)
+        (points / np.array([1, 1, 1, 256], np.float32)).tofile(path)
+    methods = ["--methods", onnx_model, "ssr", "dror", "position", "all"]
+    arguments = ["bench", "--data", root, *methods, *ONCE, "--threads", 2, "--out"]
+    one = run_derain(*arguments, tmp_path / "one")
+    two = run_derain(*arguments, tmp_path / "two", "--workers", 2)
+    assert one.said == two.said != []
+    assert scores(tmp_path / "two") == scores(tmp_path / "one")
+
+
+def scores(folder: Path) -> list[dict[str, Any]]:
+    """The rows of a bench without times and memory."""
+    costs = ("ms", "stages", "peak_memory")
+    return [
+        {name: value for name, value in row.items() if not name.startswith(costs)}
+        for row in read_report(folder)["rows"]
+    ]
+
+
 def test_methods_are_timed_on_scaled_intensities(root: Path) -> None:
     scan = root / "sequences/002/lidar_radar_pcd/0.bin"
     frame = FileFrame(key="0", path=scan)
@@ -274,7 +298,7 @@ def test_the_papers_tables_need_a_data_set_with_a_split(
 def test_a_folder_that_cannot_be_written_is_refused_before_any_work(
     refused, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delattr(bench, "score")
+    monkeypatch.delattr(bench, "scorings")
     out = root / "manifest.json"
     line = refused("bench", "--data", root, "--methods", "all", "--out", out)
     assert "bench.json: cannot be written" in line

@@ -38,6 +38,7 @@ def some(by_class: dict[str, float]) -> dict[str, float]:
 
 def test_a_data_set_is_one_object_for_programs(facts_of, data_set: Path) -> None:
     facts = facts_of(data_set)
+    assert facts_of(data_set, "--workers", 2) == facts
     assert facts["folder"] == str(data_set)
     assert facts["layout"] == ["lidar_radar_pcd", "lidar_radar_labels"]
     assert facts["card"] == "simulated rain"

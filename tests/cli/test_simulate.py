@@ -42,7 +42,7 @@ def test_a_data_set_is_written_and_written_once(succeed, refused, facts_of, tmp_
     root = tmp_path / "facility"
     outcome = succeed("simulate", "--out", root, *QUICK)
     assert outcome.out.split(".")[0] == f"{root}: 3 sequences, 3 scans"
-    assert names(root) == ["manifest.json", "sequences"]
+    assert names(root) == [".derain", "manifest.json", "sequences"]
     assert names(root / "sequences") == ["000", "001", "002"]
     assert (root / "sequences/000/ext_radar").is_dir()
     manifest = (root / "manifest.json").read_text()
@@ -62,8 +62,28 @@ def test_a_data_set_is_written_and_written_once(succeed, refused, facts_of, tmp_
 
     succeed("simulate", "--out", root, *QUICK)
     line = refused("simulate", "--out", root, *QUICK, "--seed", "1")
-    assert f"{root}: holds a simulated data set of other parameters" in line
+    assert (
+        f"{root}: holds a simulated data set of other parameters: campaign.seed was 0 and" in line
+    )
     assert (root / "manifest.json").read_text() == manifest
+
+
+def test_shards_are_counted_by_the_status(
+    succeed, run_derain, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root = tmp_path / "worlds"
+    command = ("simulate", "--out", root, "--world", "--sequences", "3", "--workers", "1")
+    assert f"derain status {root}" in succeed(*command, "--shard", "1/2").out
+    outcome = run_derain("status", root)
+    assert outcome.code == 2
+    lines = outcome.out.splitlines()
+    assert lines[0] == "1 of 3 units done, 0 failed, 2 missing"
+    assert "units a second a worker" in lines[1]
+    assert lines[2] == "to be run again: --array=0"
+    monkeypatch.setenv("SLURM_ARRAY_TASK_ID", "0")
+    monkeypatch.setenv("SLURM_ARRAY_TASK_COUNT", "2")
+    assert f"{root}: 3 sequences, 3 scans" in succeed(*command).out
+    assert json.loads(succeed("status", root, "--json").out)["done"] == 3
 
 
 def test_a_drive_goes_along_a_street_in_the_rain_asked_for_without_a_radar(
@@ -86,7 +106,7 @@ def test_a_speed_of_0_and_no_traffic_is_what_it_is_without_them(succeed, tmp_pat
     options = [*QUICK, "--no-radar", "--layout", "street", "--sequences", "1"]
     succeed("simulate", "--out", tmp_path / "plain", *options)
     succeed("simulate", "--out", tmp_path / "zero", *options, "--speed", "0", "--traffic", "0")
-    for file in (file for file in (tmp_path / "plain").rglob("*") if file.is_file()):
+    for file in (file for file in (tmp_path / "plain/sequences").rglob("*") if file.is_file()):
         same = tmp_path / "zero" / file.relative_to(tmp_path / "plain")
         assert file.read_bytes() == same.read_bytes()
 

@@ -1,4 +1,4 @@
-"""The data set that the simulation writes: whole, resumable, the same from any workers."""
+"""The data set that the simulation writes: whole, resumable, the same by workers and shards."""
 
 import fcntl
 import hashlib
@@ -19,6 +19,10 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.files import read_scan
 from derain.files.labels import read_labels
+from derain.jobs.job import FOLDER
+from derain.jobs.shard import Shard
+from derain.jobs.status import job_status
+from derain.jobs.workers import WorkerPool
 from derain.scan import Scan
 from derain.simulation import sequence
 from derain.simulation.arrays import Bools
@@ -43,7 +47,7 @@ def checksums(root: Path) -> dict[str, str]:
     return {
         file.relative_to(root).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
         for file in sorted(root.rglob("*"))
-        if file.is_file()
+        if file.is_file() and FOLDER not in file.parts
     }
 
 
@@ -116,26 +120,36 @@ def test_a_run_that_failed_leaves_nothing_half_written_and_is_taken_up_by_any_wo
         patched.setattr(sequence, "write_labels", disk_gets_full)
         with pytest.raises(InputError, match="No space left on device"):
             simulate_track(root, TINY)
-    assert [folder.name for folder in (root / "sequences").iterdir()] == ["000"]
+    assert sorted(os.listdir(root / "sequences")) == ["000", "002", "003"]
     assert "files" not in read_manifest(root)
-    (root / "sequences/.001/innoviz").mkdir(parents=True)  # as a kill leaves it
+    (failed,) = job_status(root, lambda record: None).failed
+    assert failed.unit == "001"
+    (root / "sequences/.derain-1/001/innoviz").mkdir(parents=True)  # as a kill leaves it
     kept = times(root / "sequences/000")
-    simulate_track(root, TINY, workers=2)
+    with WorkerPool(2) as workers:
+        simulate_track(root, TINY, workers)
     assert times(root / "sequences/000") == kept
     assert checksums(root) == checksums(track)
 
 
-def test_what_stopped_workers_leave_is_cleared_away(
-    open3d: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_shards_make_the_same_data_set_and_the_last_completes_its_manifest(
+    track: Path, tmp_path: Path
 ) -> None:
-    def stopped(*_: object) -> None:
-        (tmp_path / "track/sequences/.001/innoviz").mkdir(parents=True)
-        raise KeyboardInterrupt
+    root = tmp_path / "track"
+    assert not simulate_track(root, TINY, shard=Shard(1, 2))
+    assert "files" not in read_manifest(root)
+    assert simulate_track(root, TINY, shard=Shard(0, 2))
+    assert checksums(root) == checksums(track)
 
-    monkeypatch.setattr("derain.simulation.dataset.worker_pool", stopped)
-    with pytest.raises(KeyboardInterrupt):
-        simulate_track(tmp_path / "track", TINY, workers=2)
-    assert list((tmp_path / "track/sequences").iterdir()) == []
+
+def test_a_sequence_that_is_gone_is_simulated_again(track: Path, tmp_path: Path) -> None:
+    root = tmp_path / "track"
+    shutil.copytree(track, root)
+    shutil.rmtree(root / "sequences/002")
+    kept = times(root / "sequences/001")
+    simulate_track(root, TINY)
+    assert times(root / "sequences/001") == kept
+    assert checksums(root) == checksums(track)
 
 
 def test_a_data_set_that_is_there_is_not_made_twice_with_and_without_locks(

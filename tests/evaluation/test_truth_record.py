@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
+from derain.evaluation.truth_record import TruthRecord
 from derain.scan import Scan
 from derain.sources.frame import MemoryFrame
-from derain.workflows.teaching import TruthRecord
 
 CARD = DataCard("yard", {0: "wall", 1: "drop", 2: "car", 9: "nobody knows"}, (1,), (9,))
 
