@@ -119,7 +119,7 @@ def test_it_says_what_it_leaves_out_and_why(written: tuple[dict, str]) -> None:
     content, text = written
     assert list(content["methods"]) == ["nothing", "DROR", "everything", "places"]
     assert content["methods"]["DROR"] == {"parameters": DROR().as_dict()}
-    assert "no such file" in content["left_out"]["a model that is missing"]
+    assert "no such method or file" in content["left_out"]["a model that is missing"]
     assert "is not there" in content["left_out"]["elsewhere"]
     assert "no others to learn places from" in content["left_out"]["places: theirs"]
     assert all(f"- {what} is left out: " in text for what in content["left_out"])

@@ -24,6 +24,7 @@ class EpochLines(Callback):
 
     def on_train_epoch_end(self, trainer: Trainer, pl_module: LightningModule) -> None:
         """Prints the line, in one process of several."""
+        metrics = trainer.callback_metrics  # which all processes have to work out together
         if not trainer.is_global_zero:
             return
         epoch, last = trainer.current_epoch + 1, trainer.max_epochs
@@ -32,6 +33,6 @@ class EpochLines(Callback):
         if last is not None and last > 0:  # -1: until it is stopped
             of_all = f" of {last}"
             times += f", {clock(elapsed / (epoch - self._first) * (last - epoch))} left"
-        iou = float(trainer.callback_metrics.get("val_iou", math.nan))
+        iou = float(metrics.get("val_iou", math.nan))
         scored = "" if math.isnan(iou) else f"IoU {iou:.3f}; "
         print(f"epoch {epoch}{of_all}: {scored}{times}", file=sys.stderr, flush=True)

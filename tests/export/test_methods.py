@@ -41,8 +41,8 @@ def test_what_a_method_says_of_itself_makes_the_same_again(
     ("name", "parameters", "reason"),
     [
         (str(KEPT / "outdet.ckpt"), {}, f"--out {KEPT}/outdet.onnx`"),
-        ("none.ckpt", {}, "none.ckpt: no such file"),
-        ("dro", {}, "dro: no such file. Did you mean dror? Give a model"),
+        ("none.ckpt", {}, "none.ckpt: no such method or file"),
+        ("dro", {}, "dro: no such method or file. Did you mean dror? Give a model"),
         (str(KEPT / "outdet.onnx"), {"neighbours": 3}, "it has no parameter neighbours"),
         (str(KEPT / "outdet.onnx"), {"threshold": 1.5}, "threshold is 1.5"),
         (str(KEPT / "outdet.onnx"), {"threshold": "high"}, "threshold is high"),

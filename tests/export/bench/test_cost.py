@@ -26,7 +26,7 @@ def test_a_method_that_cannot_be_timed_states_why(labelled: LabelledFrames) -> N
     broken = BenchEntry("broken", "outdet", partial(load_method, "moved.onnx", {}))
     cost = measure_cost(broken, Timing(labelled.frames, repeats=1))
     assert cost.failure is not None
-    assert cost.failure.startswith("moved.onnx: no such file")
+    assert cost.failure.startswith("moved.onnx: no such method or file")
     assert np.isnan(cost.times.percentile(50))
     assert cost.peak_memory is None
 
