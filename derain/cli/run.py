@@ -51,7 +51,6 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from derain.bags.names import within
 from derain.cli.method_options import add_method_and_scans, method_and_scans, method_of
 from derain.cli.options import (
     add_columns,
@@ -79,9 +78,10 @@ from derain.sources.clean_sink import CleanSink, require_probabilities
 from derain.sources.cleaned_bags import RAIN_PROBABILITY, BagOptions
 from derain.sources.cleaned_scan import ScanOutcome
 from derain.sources.cleaning import CleaningObserver, CleanReport, clean
-from derain.sources.folders import named_frames
 from derain.sources.method import Method
 from derain.sources.recordings import irregularities
+from derain.sources.store_listing import frames_at
+from derain.stores.url import place_of
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
 from derain.views.scan_issues import MOST_RAIN, ScanIssue
@@ -105,8 +105,8 @@ CUES = "cues"
 
 def add_arguments(parser: Parser) -> None:
     """Declares the command's arguments."""
-    add_method_and_scans(parser, help="scans, folders of scans, or a data set's folder")
-    parser.add_argument("--out", type=Path, required=True, help="folder to write to")
+    add_method_and_scans(parser, help="scans, folders of scans, a data set's folder, or URLs")
+    parser.add_argument("--out", type=place_of, required=True, help="folder or URL to write to")
     add_json(parser)
     add_columns(parser)
     add_intensity_scale(parser)
@@ -119,7 +119,7 @@ def add_arguments(parser: Parser) -> None:
         "1 cleans every scan)",
     )
     parser.add_argument(
-        "--removed", type=Path, metavar="DIR", help="write the removed points to DIR"
+        "--removed", type=place_of, metavar="DIR", help="write the removed points to DIR"
     )
     parser.add_argument(
         "--probability", action="store_true", help=f"add the column {RAIN_PROBABILITY} to the scans"
@@ -157,7 +157,7 @@ def main(arguments: argparse.Namespace) -> int:
     name, scans = method_and_scans(arguments.method, arguments.scans or [])
     arguments.threads = threads_of_each(arguments)
     method = method_of(name, arguments)
-    frames = named_frames(within(scans, arguments.topic), arguments.columns)
+    frames = frames_at(scans, arguments.columns, arguments.topic)
     source = placed(frames, arguments.poses, arguments.threads).map(
         lambda frame: frame.with_intensity_times(arguments.intensity_scale)
     )
@@ -180,7 +180,7 @@ def main(arguments: argparse.Namespace) -> int:
         noting_progress(sink.so_far),
         executor_of(arguments) as executor,
     ):
-        printer = _Printer(arguments.out, rows, arguments.json)
+        printer = _Printer(sink.folder, rows, arguments.json)
         if name == DEFAULT:
             printer.introduce_default()
         for sentence in irregularities(source, needed):

@@ -12,12 +12,12 @@ The exit code is 2 unless all units are done.
 
 import argparse
 import json
-from pathlib import Path
 
 from derain.cli.outputs import print_lines
 from derain.cli.parser import Parser
 from derain.jobs.status import JobStatus, job_status
 from derain.sources.cleaned_totals import CleanedTotals
+from derain.stores.url import place_of
 
 # At most so many failed units are printed with their reasons.
 MOST_FAILED = 20
@@ -25,7 +25,7 @@ MOST_FAILED = 20
 
 def add_arguments(parser: Parser) -> None:
     """Declares the command's arguments."""
-    parser.add_argument("out", type=Path, metavar="OUT", help="folder that --out named")
+    parser.add_argument("out", type=place_of, metavar="OUT", help="folder or URL that --out named")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 

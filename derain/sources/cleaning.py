@@ -1,8 +1,9 @@
 """Cleans the scans of a source, and reports what was done."""
 
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tqdm import tqdm
@@ -18,9 +19,11 @@ from derain.sources.folders import GivenScans, source_of
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
 from derain.sources.source import Source
+from derain.sources.stored_frame import StoredFrame
 from derain.sources.unit_cleaning import UnitCleaning
 from derain.sources.units import Division, FrameUnit, units_of, whole
 from derain.sources.weather_monitor import WeatherMonitor, WeatherOptions
+from derain.stores.url import Place
 from derain.views.scan_issues import MOST_RAIN, ScanIssue
 
 
@@ -101,13 +104,14 @@ def clean(
     Args:
         source: A source; or one or more scans, frames, files and folders, in time order.
         method: A model, a filter, or a method that sees several scans.
-        sink: Folder to write to, or a sink with its options, opened by ``with``.
+        sink: Folder or URL to write to, or a sink with its options, opened by ``with``.
         most_removed: Scans with a greater share of rain in their valid points are not written.
         weather: How the weather is measured.
         observer: Follows the cleaning.
         division: How the scans are divided into units. Where there are more scans than a block has,
             a record of each unit is kept in the folder, by which a run that was stopped goes on.
-            None keeps no records, unless there is an executor.
+            None keeps no records, unless there is an executor, or a source or a sink in an object
+            store.
         executor: Does the units: an executor of :mod:`concurrent.futures` or the like, whose
             processes find all files by the same paths. None does them in this process.
 
@@ -125,9 +129,12 @@ def clean(
     failures: list[InputError] = []
     before = 0
     with nullcontext(sink) if isinstance(sink, CleanSink) else CleanSink(sink, source) as opened:
-        work = UnitCleaning(method, opened.for_scans, most_removed, measured, method.fingerprint())
-        division = Division(resume=True) if division is None and executor is not None else division
-        if division is not None and _keeps_records(source, division, opened.folder):
+        work = UnitCleaning(
+            method, opened.destination, most_removed, measured, method.fingerprint()
+        )
+        if executor is not None or _is_stored(source, opened):
+            division = replace(division or Division(), resume=True)
+        if division is not None and _keeps_records(source, division, opened.destination.folder):
             job = _job(source, work, opened, division)
             units = units_of(source, method, division.block)
             job.list_units(units)
@@ -137,8 +144,10 @@ def clean(
             units = [whole(source)]
             outcomes = _at_once(units[0], work, opened, observer)
         scans = sum(len(unit.frames) for unit in units)
+        found = Counter[str]()
         for result in tqdm(outcomes, total=scans, unit="scan", disable=None):
             outcome = result.result
+            found[result.unit.id] += 1
             observer.noticed(outcome.frame.name, outcome.issues)
             if outcome.error is not None:
                 failures.append(outcome.error)
@@ -153,6 +162,8 @@ def clean(
                 observer.cleaned(outcome)
             before += result.before
             cleaned.append(outcome.figures)
+    # How many clouds the bags of a store have shows only when they are fetched.
+    scans = sum(max(len(unit.frames), found[unit.id]) for unit in units)
     return CleanReport(cleaned, failures, monitor, before, scans - len(cleaned))
 
 
@@ -164,7 +175,12 @@ def _at_once(
         yield UnitResult(unit, outcome, before=False)
 
 
-def _keeps_records(source: Source, division: Division, folder: Path) -> bool:
+def _is_stored(source: Source, sink: CleanSink) -> bool:
+    """Whether scans are read from an object store, or written to one."""
+    return sink.destination.is_stored or any(isinstance(each, StoredFrame) for each in source)
+
+
+def _keeps_records(source: Source, division: Division, folder: Place) -> bool:
     """Whether there is a record of each unit: where it is asked for, or begun, or takes long."""
     asked = division.resume or division.anew or division.shard is not None
     return asked or len(source) > division.block or Job.is_begun(folder)
@@ -187,4 +203,4 @@ def _job(source: Source, work: UnitCleaning, sink: CleanSink, division: Division
         "columns": sorted({",".join(frame.columns) for frame in files}),
         "intensity_scale": sorted({frame.intensity_scale for frame in source}),
     }
-    return Job.begin(sink.folder, options, division.shard, division.anew)
+    return Job.begin(sink.destination.folder, options, division.shard, division.anew)

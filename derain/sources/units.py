@@ -11,6 +11,7 @@ from derain.sources.bag_frame import BagFrame
 from derain.sources.frame import Frame
 from derain.sources.method import Method
 from derain.sources.recordings import recordings_of
+from derain.sources.stored_frame import StoredBag
 from derain.views.window import Window
 
 # Scans of a block: a few seconds of a drive, beside which the scans around a block that are read
@@ -75,7 +76,7 @@ def whole(source: Sequence[Frame]) -> FrameUnit:
 
 def _units_of(recording: list[Frame], method: Method, block: int) -> Iterator[FrameUnit]:
     first = recording[0]
-    if isinstance(first, BagFrame):
+    if isinstance(first, BagFrame | StoredBag):
         unit = _unit(recording, 0, len(recording), Window())
         yield replace(unit, id=first.sequence)
         return
