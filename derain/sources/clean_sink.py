@@ -18,7 +18,7 @@ from derain.sources.sink import FolderSink
 from derain.sources.source import Source
 from derain.sources.stored_frame import StoredBag
 from derain.stores.mirror import uploaded
-from derain.stores.url import Place, is_url, path_of, url_of
+from derain.stores.url import Place, is_url, is_web, path_of, url_of, without_secrets
 
 
 class CleanSink:
@@ -219,7 +219,17 @@ def require_probabilities(method: Method, source: Source) -> None:
 
 
 def _path_of(place: Place) -> Path:
-    """The path of a folder, or the one that stands for its URL."""
+    """The path of a folder, or the one that stands for its URL.
+
+    Raises:
+        InputError: It is on a web server.
+    """
+    if is_web(place):
+        raise InputError(
+            without_secrets(str(place)),
+            "a web server takes no results",
+            "Name a folder, or a URL such as s3://bucket/cleaned.",
+        )
     return path_of(str(place)) if is_url(place) else Path(place)
 
 

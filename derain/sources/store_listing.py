@@ -68,10 +68,12 @@ class _Listing:
     """
 
     def __init__(self, lent: Mirror, objects: Iterable[StoredObject]) -> None:
+        self._lent = lent
         self._root = lent.root
         self._stamps: dict[Path, str] = {}
-        self._objects = {stored.path: stored for stored in objects if not _is_hidden(stored)}
-        lent.mark(self._objects.values())
+        found = ((stored.path, stored) for stored in objects)
+        self._objects = {path: stored for path, stored in found if not _is_hidden(path)}
+        lent.mark(self._objects)
         lent.fetch(each for path, each in self._objects.items() if path.name in READ_WHEN_LISTED)
 
     def bag(self, path: Path, labelled: bool, by_name: bool) -> list[Frame]:
@@ -107,7 +109,7 @@ class _Listing:
             path=path,
             columns=frame.columns,
             objects=(self._objects[path],),
-            recorded=(_recorded(lambda: frame.time), _recorded(lambda: frame.pose)),
+            recorded=(self._recorded(lambda: frame.time), self._recorded(lambda: frame.pose)),
             records_stamp=self._stamp(path.parent),
         )
 
@@ -124,14 +126,13 @@ class _Listing:
             self._stamps[folder] = " ".join(f"{each.size}-{each.version}" for each in there)
         return self._stamps[folder]
 
+    def _recorded(self, value: Callable[[], Value]) -> Value | InputError:
+        """What a record has, or the error of a damaged one."""
+        try:
+            return value()
+        except InputError as error:
+            return self._lent.error_with_urls(error)
 
-def _is_hidden(stored: StoredObject) -> bool:
-    return any(part.startswith(".") for part in stored.path.parts)
 
-
-def _recorded(value: Callable[[], Value]) -> Value | InputError:
-    """What a record has, or the error of a damaged one."""
-    try:
-        return value()
-    except InputError as error:
-        return error
+def _is_hidden(path: Path) -> bool:
+    return any(part.startswith(".") for part in path.parts)

@@ -1,5 +1,6 @@
-"""Small documents in a folder, of this machine or of a store; each is written whole."""
+"""Small documents of JSON in a folder, of this machine or of a store; each is written whole."""
 
+import json
 import os
 import shutil
 from abc import ABC, abstractmethod
@@ -132,6 +133,7 @@ class ObjectDocuments(Documents):
                 read: bytes = filesystem.cat_file(f"{folder}/{name}")
             except FileNotFoundError:
                 return None
+            json.loads(read)  # a read that breaks off shows here, and is tried again
             return read
 
         return tried(f"{self._url}/{name}", content)

@@ -1,5 +1,6 @@
 """A temporary folder in which objects lie at the paths that stand for their URLs."""
 
+import os
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -36,13 +37,22 @@ class Mirror:
         with writing(self.root):
             fetch({self.root / stored.path: stored for stored in objects})
 
-    def mark(self, objects: Iterable[StoredObject]) -> None:
-        """Makes an empty file for each object: enough to see which there are."""
-        with writing(self.root):
-            for folder, files in _by_folder(self.root / stored.path for stored in objects).items():
-                folder.mkdir(parents=True, exist_ok=True)
-                for file in files:
-                    file.touch()
+    def mark(self, paths: Iterable[Path]) -> None:
+        """Makes an empty file for each object: enough to see which there are.
+
+        Args:
+            paths: The paths that stand for their URLs.
+
+        Raises:
+            InputError: A path is too long for a file, or both a file and a folder.
+        """
+        made = set[Path]()
+        for path in paths:
+            with writing(path):
+                if path.parent not in made:
+                    (self.root / path.parent).mkdir(parents=True, exist_ok=True)
+                    made.add(path.parent)
+                os.close(os.open(self.root / path, os.O_WRONLY | os.O_CREAT))
 
     def with_urls(self, text: str) -> str:
         """A text with URLs in place of paths in the folder."""
@@ -90,10 +100,3 @@ def uploaded(place: Place) -> Iterator[Path]:
             folder = stack.enter_context(temporary_folder(Path(gettempdir())))
         yield folder
         upload(folder, str(place))
-
-
-def _by_folder(files: Iterable[Path]) -> dict[Path, list[Path]]:
-    by_folder: dict[Path, list[Path]] = {}
-    for file in files:
-        by_folder.setdefault(file.parent, []).append(file)
-    return by_folder

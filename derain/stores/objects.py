@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from derain.errors import InputError, reason_of
-from derain.stores.url import path_of, without_secrets
+from derain.stores.url import is_web, path_of, without_secrets
 from derain.system.extras import FSSPEC
 
 # Seconds between the tries of a request; each wait is drawn between half of it and all.
@@ -177,15 +177,11 @@ def _opened(url: str) -> tuple[Any, str]:
 
 
 def _entries(filesystem: Any, url: str, path: str) -> list[dict[str, Any]]:
-    if _is_web(url) and not without_secrets(url).endswith("/"):
+    if is_web(url) and not without_secrets(url).endswith("/"):
         return [filesystem.info(path)]
     found = filesystem.find(path, detail=True).values()
     files = [entry for entry in found if entry["type"] == "file" and entry["name"][-1] != "/"]
-    return [filesystem.info(entry["name"]) for entry in files] if _is_web(url) else files
-
-
-def _is_web(url: str) -> bool:
-    return url.startswith(("http://", "https://"))
+    return [filesystem.info(entry["name"]) for entry in files] if is_web(url) else files
 
 
 def _object(filesystem: Any, entry: Mapping[str, Any]) -> StoredObject:
@@ -208,7 +204,7 @@ def _fetch(file: Path, stored: StoredObject) -> None:
 
 def _is_final(url: str, error: Exception) -> bool:
     if isinstance(error, FileNotFoundError):
-        return not _is_web(url) or _is_missing(error)
+        return not is_web(url) or _is_missing(error)
     return isinstance(error, FINAL) or type(error).__name__ in FINAL_NAMES
 
 

@@ -17,6 +17,11 @@ def is_url(place: Place) -> bool:
     return isinstance(place, str) and re.match(f"{SCHEME}://", place) is not None
 
 
+def is_web(place: Place) -> bool:
+    """Whether a place is on a web server, which is read and not written."""
+    return isinstance(place, str) and place.startswith(("http://", "https://"))
+
+
 def place_of(text: str) -> Place:
     """The place that a user names: a URL as it is, anything else as a path."""
     return text if is_url(text) else Path(text)
@@ -35,7 +40,7 @@ def path_of(url: str) -> Path:
         InputError: A part of the URL would lead out of its folder.
     """
     scheme, _, rest = without_secrets(url).partition("://")
-    parts = rest.rstrip("/").split("/")
+    parts = rest.strip("/").split("/")
     if any(part in ("", ".", "..") for part in parts):
         raise InputError(
             without_secrets(url),
