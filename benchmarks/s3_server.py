@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from threading import Lock, Thread
 from typing import Any
 from unittest.mock import patch
+from urllib.request import Request, urlopen
 
 BUCKET = "drives"
 
@@ -68,6 +69,9 @@ def s3_server(faults: Faults | None = None) -> Iterator[str]:
         "AWS_DEFAULT_REGION": "us-east-1",
     }
     try:
+        # What an earlier server of this process held.
+        with urlopen(Request(f"{url}/moto-api/reset", method="POST")):
+            pass
         with patch.dict(os.environ, access):
             file_system().mkdir(BUCKET)
             yield url

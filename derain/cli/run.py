@@ -10,6 +10,7 @@ format of the input with all its fields.
   derain run dror scans/ --out cleaned --removed removed
   derain run drive.mcap --out cleaned --removed-topic /rain
   derain run scans/ --out cleaned --weather weather.csv
+  derain run s3://bucket/drives --out s3://bucket/cleaned
 
   derain run model.onnx scans/ more/scan.pcd --out cleaned --threads 2 --json
   derain run model.onnx nuscenes/ --out cleaned --columns x,y,z,intensity,ring
@@ -74,6 +75,7 @@ from derain.errors import InputError
 from derain.example import Truth
 from derain.export.runtime import Derainer
 from derain.files.labels import LABEL
+from derain.recordings.posed import STANDING
 from derain.sources.clean_sink import CleanSink, require_probabilities
 from derain.sources.cleaned_bags import RAIN_PROBABILITY, BagOptions
 from derain.sources.cleaned_scan import ScanOutcome
@@ -81,7 +83,8 @@ from derain.sources.cleaning import CleaningObserver, CleanReport, clean
 from derain.sources.method import Method
 from derain.sources.recordings import irregularities
 from derain.sources.store_listing import frames_at
-from derain.stores.url import place_of
+from derain.sources.stored_frame import StoredBag
+from derain.stores.url import Place, is_url, place_of
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
 from derain.views.scan_issues import MOST_RAIN, ScanIssue
@@ -158,6 +161,11 @@ def main(arguments: argparse.Namespace) -> int:
     arguments.threads = threads_of_each(arguments)
     method = method_of(name, arguments)
     frames = frames_at(scans, arguments.columns, arguments.topic)
+    # Of the bags of a store, the clouds are not known before they are fetched.
+    stored = [frame for frame in frames if isinstance(frame, StoredBag)]
+    if stored and arguments.poses not in (None, STANDING):
+        reason = f"{stored[0].name} is in a store, and its clouds are not known before the run"
+        raise InputError("--poses", reason, "Copy the bag to this machine.")
     source = placed(frames, arguments.poses, arguments.threads).map(
         lambda frame: frame.with_intensity_times(arguments.intensity_scale)
     )
@@ -165,7 +173,7 @@ def main(arguments: argparse.Namespace) -> int:
         require_probabilities(method, source)
     # What does without the scans around each need not be warned of scans that have none.
     needed = method.window
-    method = _over_recording(method, arguments, len(source))
+    method = _over_recording(method, arguments, len(source) > 1 or bool(stored))
     weather = weather_options(arguments)
     sink = CleanSink(
         arguments.out,
@@ -180,10 +188,11 @@ def main(arguments: argparse.Namespace) -> int:
         noting_progress(sink.so_far),
         executor_of(arguments) as executor,
     ):
-        printer = _Printer(sink.folder, rows, arguments.json)
+        printer = _Printer(arguments.out, rows, arguments.json)
         if name == DEFAULT:
             printer.introduce_default()
-        for sentence in irregularities(source, needed):
+        known = (frame for frame in source if not isinstance(frame, StoredBag))
+        for sentence in irregularities(known, needed):
             warn(sentence)
         report = clean(
             source,
@@ -201,7 +210,7 @@ def main(arguments: argparse.Namespace) -> int:
     return code or warn_of_bad_weather(report.weather, arguments.fail_at)
 
 
-def _over_recording(method: Method, arguments: argparse.Namespace, scans: int) -> Method:
+def _over_recording(method: Method, arguments: argparse.Namespace, several: bool) -> Method:
     """The method that sees the scans around each, where the command line or the model asks for it.
 
     Raises:
@@ -213,7 +222,7 @@ def _over_recording(method: Method, arguments: argparse.Namespace, scans: int) -
         raise InputError("--alone", reason, "Leave it out.")
     if asked and not isinstance(method, Derainer):
         raise InputError("--past, --delay", "are options of models", "Leave them out.")
-    of_itself = isinstance(method, Derainer) and method.spec.network == CUES and scans > 1
+    of_itself = isinstance(method, Derainer) and method.spec.network == CUES and several
     if isinstance(method, Derainer) and (asked or (of_itself and not arguments.alone)):
         from derain.export.recorded import RecordedDerainer  # a single scan needs no odometry
 
@@ -227,7 +236,7 @@ def _over_recording(method: Method, arguments: argparse.Namespace, scans: int) -
 class _Printer(CleaningObserver):
     """Prints what is done to the scans, and makes a row of a table of the weather of each."""
 
-    def __init__(self, out: Path, rows: list[Sequence[object]], as_json: bool) -> None:
+    def __init__(self, out: Place, rows: list[Sequence[object]], as_json: bool) -> None:
         self._out = out
         self._notices = Notices()
         self._rows = rows
@@ -261,7 +270,8 @@ class _Printer(CleaningObserver):
         """Adds a row to the table, and prints a line."""
         self.found(outcome)
         print_facts(asdict(outcome.figures), str(outcome.figures), self._as_json)
-        self._example.add(outcome.frame.name, self._out / f"{outcome.frame.key}{LABEL}")
+        if not is_url(self._out):
+            self._example.add(outcome.frame.name, Path(self._out, f"{outcome.frame.key}{LABEL}"))
 
     def found(self, outcome: ScanOutcome) -> None:
         """Adds a row to the table."""

@@ -2,6 +2,7 @@
 
   derain status cleaned
   derain status cleaned --json
+  derain status s3://bucket/cleaned
 
 A unit is a recording, a bag, or a block of scans of a long recording. Runs of more than 50 scans
 keep a record of each unit in the folder of --out, and so do runs by several processes or machines.

@@ -104,8 +104,13 @@ class CleanSink:
             judgement: The scan, judged; scans of a bag come in the order of the bag.
 
         Raises:
-            InputError: It cannot be written.
+            InputError: It cannot be written, or the folder is a URL: :func:`derain.clean` opens a
+                sink for each unit, whose files are uploaded together.
         """
+        if self.destination.is_stored:
+            raise InputError(
+                url_of(self.folder), "is written to in units", "Give the sink to derain.clean."
+            )
         frame, rain = judgement.frame, judgement.rain
         assert frame is not None
         if self._bags.takes(frame):

@@ -5,12 +5,14 @@ each request is tried several times, with growing waits, and the size of a copy 
 listing.
 """
 
+import errno
 import random
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import gettempdir
 from typing import Any, TypeVar
 
 from derain.errors import InputError, reason_of
@@ -203,9 +205,16 @@ def _fetch(file: Path, stored: StoredObject) -> None:
 
 
 def _is_final(url: str, error: Exception) -> bool:
+    if _is_full(error):
+        return True
     if isinstance(error, FileNotFoundError):
         return not is_web(url) or _is_missing(error)
     return isinstance(error, FINAL) or type(error).__name__ in FINAL_NAMES
+
+
+def _is_full(error: Exception) -> bool:
+    """Whether there is no room for a copy on this machine."""
+    return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
 
 
 def _is_missing(error: FileNotFoundError) -> bool:
@@ -221,6 +230,12 @@ def _missing(url: str) -> InputError:
 def _refusal(url: str, error: Exception) -> InputError:
     if isinstance(error, InputError):
         return error
+    if _is_full(error):
+        return InputError(
+            without_secrets(url),
+            f"there is no room for a copy in {gettempdir()}",
+            "Make room there, or name another folder in TMPDIR.",
+        )
     if isinstance(error, FileNotFoundError):
         if _is_final(url, error):
             return _missing(url)
