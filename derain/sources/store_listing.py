@@ -73,8 +73,9 @@ class _Listing:
         self._stamps: dict[Path, str] = {}
         found = ((stored.path, stored) for stored in objects)
         self._objects = {path: stored for path, stored in found if not _is_hidden(path)}
-        lent.mark(self._objects)
-        lent.fetch(each for path, each in self._objects.items() if path.name in READ_WHEN_LISTED)
+        read = {path for path in self._objects if path.name in READ_WHEN_LISTED}
+        lent.mark(path for path in self._objects if path not in read)
+        lent.fetch(self._objects[path] for path in read)
 
     def bag(self, path: Path, labelled: bool, by_name: bool) -> list[Frame]:
         """The bag that a path of the mirror leads into, as one frame."""
