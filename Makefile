@@ -1,9 +1,10 @@
 # Every target sets up what it needs: python3 with venv, make and git are all that a machine must have.
 VENV := .venv
 PYTHON := $(VENV)/bin/python
+INSTALL := $(PYTHON) -m pip install --quiet --quiet -c constraints.txt
 READY := $(VENV)/.ready
 
-.PHONY: demo test test-openvino lint types docs dist clean
+.PHONY: demo test test-openvino lint types docs lock dist clean
 
 # With SCAN=path, it ends with a scan of your own.
 demo: $(READY)
@@ -16,7 +17,7 @@ test: $(READY)
 
 # Not among `make test`: a runtime of 180 MB, which nobody has to have.
 test-openvino: $(READY)
-	$(PYTHON) -m pip install --quiet -c constraints.txt -e ".[openvino]"
+	$(INSTALL) --no-build-isolation -e ".[openvino]"
 	$(PYTHON) -m pytest tests/export/runtimes
 
 lint: $(READY)
@@ -32,19 +33,27 @@ types: $(READY)
 
 # The site in build/site; a warning is an error.
 docs: $(READY)
-	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict
+	$(PYTHON) -m docs.tools.package_tree
+	$(PYTHON) -m docs.tools.notebook docs/first_scan.ipynb build/docs/first_scan.md
+	$(PYTHON) -m zensical build --clean --strict
+	$(PYTHON) -m docs.tools.llms_text
 
-# The wheel and the source distribution, each built, compared, installed alone, and run.
+# constraints.txt anew, from the newest versions that pyproject.toml admits; torch stays.
+lock: $(READY)
+	$(PYTHON) -m release.lock
+
+# The wheel and the source distribution, each built, compared, installed alone, and run. With TAG=name,
+# only where that is the tag of this version.
 dist: $(READY)
-	$(PYTHON) -m release.build --out dist
+	$(PYTHON) -m release.build --out dist $(if $(TAG),--tag "$(TAG)")
 
-# torch first and alone: with it in place, no other package brings a build of several gigabytes.
+# pip first: that of an older Python knows no dependency groups. setuptools with it, to build derain.
 $(READY): pyproject.toml constraints.txt
 	python3 -m venv $(VENV)
-	$(PYTHON) -m pip install --quiet -c constraints.txt torch
-	$(PYTHON) -m pip install --quiet -c constraints.txt -e ".[dev]"
+	$(INSTALL) pip setuptools
+	$(INSTALL) --no-build-isolation --group dev -e ".[all,docs]"
 	$(PYTHON) -m derain.system.open3d_import
 	touch $@
 
 clean:
-	rm -rf $(VENV) build dist demo runs *.egg-info
+	rm -rf $(VENV) .cache build dist demo runs *.egg-info

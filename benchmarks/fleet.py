@@ -94,8 +94,8 @@ def cluster(folder: Path) -> Iterator[list[subprocess.Popen[bytes]]]:
 
 
 def one_process(run: Run, out: Path) -> None:
-    """Cleans as `derain run` does by itself, with every thread."""
-    subprocess.run(run.command(out), check=True, capture_output=True)
+    """Cleans in one process, with every thread."""
+    subprocess.run(run.command(out, "--workers", "1"), check=True, capture_output=True)
 
 
 def two_workers(run: Run, out: Path) -> None:
@@ -140,7 +140,8 @@ def main() -> int:
     parser.add_argument("--ways", nargs="+", choices=WAYS, default=list(WAYS))
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
-        options = ["--block", str(arguments.block), *(["--alone"] if arguments.alone else [])]
+        options = ["--block", str(arguments.block), "--most-removed", "1"]
+        options += ["--alone"] if arguments.alone else []
         source = [path.absolute() for path in arguments.source]
         run = Run(source, arguments.method, options, Path(name))
         with cluster(run.root):

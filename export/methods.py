@@ -21,6 +21,11 @@ from derain.views.candidates import candidates_at
 PARAMETER_SUFFIXES = (".yaml", ".yml")
 CHECKPOINT_SUFFIX = ".ckpt"
 
+# The network whose models see the scans around each unasked; and how many before and after, as far
+# as they are of its recording.
+CUES = "cues"
+PAST, DELAY = 1, 1
+
 
 def named_method(text: str) -> tuple[str, dict[str, Any]]:
     """The method that a user names, and its parameters as far as they are given with it.
@@ -132,7 +137,7 @@ def _loaded(name: str, parameters: Mapping[str, Any], threads: int, runtime: Run
             _refuse_runtime(name, "method", runtime)
             return METHODS[name].with_parameters(parameters, threads)
     if name != DEFAULT and not is_file(Path(name)):
-        raise InputError(name, "no such file", f"{method_hint(name)}.")
+        raise InputError(name, "no such method or file", f"{method_hint(name)}.")
     if Path(name).suffix == CHECKPOINT_SUFFIX:
         raise InputError(
             name,
@@ -141,6 +146,19 @@ def _loaded(name: str, parameters: Mapping[str, Any], threads: int, runtime: Run
         )
     derainer = Derainer(name, threads, runtime.name, runtime.precision)
     return _with_threshold(derainer, name, parameters)
+
+
+def over_recording(method: Method) -> Method:
+    """The method as it is best for a recording: a model of cues sees the scans around each, too.
+
+    Args:
+        method: A method that is ready to judge scans.
+    """
+    if not (isinstance(method, Derainer) and method.spec.network == CUES):
+        return method
+    from derain.export.recorded import RecordedDerainer  # a single scan needs no odometry
+
+    return RecordedDerainer(method, PAST, DELAY)
 
 
 def load_method_of_one_scan(

@@ -1,8 +1,8 @@
 """A model over a recording: what it makes of each scan, and the rays of the scans around it."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -34,6 +34,16 @@ OF_ENDING, OF_THROUGH = -10.35, 0.89
 # Source: modelling choice.
 SHARE_ADDED = 0.5
 
+# A judgement of another scan by itself, and what takes the frame of the scan that is judged to that
+# of the other, float64 (4, 4), metres.
+PlacedJudgement = tuple[Judgement, NDArray[np.float64]]
+
+UNLIKE = ScanIssue(
+    "unlike the scans around it",
+    "the scans around it do not show the same from where it was taken: its pose is wrong, or it is "
+    "there twice; it is judged by itself",
+)
+
 # Of at most so many points that the model takes for solid, more rays of another scan have to end at
 # them than go through them. Where they do not, a pose is wrong.
 CHECKED = 2000
@@ -45,7 +55,8 @@ class RecordedDerainer(Method):
     Rays of another scan that end where a point is show something solid there, unless the model
     takes their own ends for rain. Those that went through the place show that nothing was. Where
     the sensor was comes from the poses of the frames, or else from odometry. A scan of which that
-    is not known, or whose pose does not match what it shows, is judged alone.
+    is not known, or whose pose does not match what it shows, is judged alone. Rays of a scan that
+    the model cannot judge show nothing.
 
     Example:
         >>> derainer = RecordedDerainer(Derainer("model.onnx"), past=1)
@@ -60,6 +71,8 @@ class RecordedDerainer(Method):
     Raises:
         InputError: Numbers of scans below 0, or a model that sees several scans itself.
     """
+
+    EXAMINE_EVERY: ClassVar[int] = 1  # any scan may be one beside which another fails
 
     def __init__(self, model: Derainer, past: int = 1, delay: int = 0) -> None:
         if not model.window.is_one_scan:
@@ -117,15 +130,10 @@ class RecordedDerainer(Method):
         self._end_recording()
 
     def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
-        """What is odd about a scan for the model, and whether it does not match those around it."""
+        """What is odd about a scan for the model, and about the scans around it."""
         yield from self.model.issues(judgement)
         yield from self._frames.damage(judgement.scan)
-        if judgement.scan in self._unlike:
-            yield ScanIssue(
-                "unlike the scans around it",
-                "the scans around it do not show the same from where it was taken: its pose is "
-                "wrong, or it is there twice; it is judged by itself",
-            )
+        yield from self._odd.get(judgement.scan, ())
 
     def as_dict(self) -> dict[str, Any]:
         """What commands call the model, its threshold, and how many scans around one it sees."""
@@ -142,8 +150,8 @@ class RecordedDerainer(Method):
     def _end_recording(self) -> None:
         self._frames = PlacedFrames(self.window, self.model.threads)
         self._rays: WeakKeyDictionary[Scan, Rays] = WeakKeyDictionary()
-        self._alone: dict[Scan, Judgement] = {}
-        self._unlike: WeakKeyDictionary[Scan, bool] = WeakKeyDictionary()
+        self._alone: dict[Scan, Judgement | None] = {}
+        self._odd: WeakKeyDictionary[Scan, list[ScanIssue]] = WeakKeyDictionary()
 
     def _judged(self, ready: FrameInWindow, stopwatch: Stopwatch) -> Judgement:
         scans = ready.scans
@@ -151,6 +159,9 @@ class RecordedDerainer(Method):
         # Of no scan that is not seen any more: each judgement holds its scan.
         self._alone = {scan: self._alone_of(scan, stopwatch) for scan in seen}
         alone = self._alone[scans.scan]
+        if alone is None:
+            alone = self.model.judge_silently(scans.scan, stopwatch)  # which raises the reason
+        self._odd[scans.scan] = [_fails(scan) for scan, judged in self._alone.items() if not judged]
         with stopwatch.stage("rays"):
             probability = self._with_rays(alone, scans)
         rain = probability > self.model.spec.threshold
@@ -160,18 +171,13 @@ class RecordedDerainer(Method):
     def _with_rays(self, alone: Judgement, scans: WindowOfScans) -> NDArray[np.float32]:
         """Probabilities of rain by the model and by the rays of other scans, float32 (N,)."""
         doubtful = np.flatnonzero(alone.probability > DOUBTFUL)
-        others = [(other, scans.judged.to(other)) for other in (*scans.before, *scans.after)]
-        known = {
-            other.scan: to_other
-            for other, to_other in others
-            if to_other is not None and len(self._rays_of(other.scan))
-        }
+        others = self._placed_others(scans)
         solid = evenly(np.flatnonzero(alone.judged & (alone.probability <= DOUBTFUL)), CHECKED)
-        if not (known and len(solid)):
+        if not (others and len(solid)):
             return alone.probability
-        evidence = self._evidence(alone.scan, solid, doubtful, known)
+        evidence = self._evidence(alone.scan, solid, doubtful, others)
         if evidence is None:
-            self._unlike[alone.scan] = True
+            self._odd[alone.scan].append(UNLIKE)
             return alone.probability
         probability = alone.probability.copy()
         certain = np.finfo(np.float64).eps
@@ -180,12 +186,21 @@ class RecordedDerainer(Method):
         probability[doubtful] = 1 / (1 + np.exp(-log_odds))
         return probability
 
+    def _placed_others(self, scans: WindowOfScans) -> list[PlacedJudgement]:
+        """The scans around one that are judged and whose place is known."""
+        found = []
+        for other in (*scans.before, *scans.after):
+            judgement, to_other = self._alone[other.scan], scans.judged.to(other)
+            if judgement is not None and to_other is not None and len(self._rays_of(other.scan)):
+                found.append((judgement, to_other))
+        return found
+
     def _evidence(
         self,
         scan: Scan,
         solid: NDArray[np.int64],
         doubtful: NDArray[np.int64],
-        others: Mapping[Scan, NDArray[np.float64]],
+        others: Sequence[PlacedJudgement],
     ) -> RayEvidence | None:
         """What the rays of other scans show at the doubtful points; None where none shows the same.
 
@@ -193,31 +208,45 @@ class RecordedDerainer(Method):
             scan: The scan.
             solid: Rows of points that the model takes for solid, int64 (Q,), one or more.
             doubtful: Rows of the doubtful points, int64 (D,).
-            others: Other scans, and what takes the frame of this one to theirs.
+            others: Other scans as they are judged alone, and what takes the frame of this one to
+                theirs.
         """
         found = []
         rows = np.concatenate([solid, doubtful])
-        for other, transform in others.items():
+        for other, transform in others:
             # A scan that is there twice shows its own drops as what persists.
-            if np.array_equal(other.xyz, scan.xyz, equal_nan=True):
+            if np.array_equal(other.scan.xyz, scan.xyz, equal_nan=True):
                 continue
             places = scan.xyz[rows] @ transform[:3, :3].T + transform[:3, 3]
-            rays, step = self._rays_of(other), self._rays_of(scan).step
-            seen = ray_evidence(places, rays, step, self._alone[other].rain[rays.rows])
+            rays, step = self._rays_of(other.scan), self._rays_of(scan).step
+            seen = ray_evidence(places, rays, step, other.rain[rays.rows])
             of_solid, of_doubtful = seen[: len(solid)], seen[len(solid) :]
             if of_solid.ending.sum() > of_solid.through.sum():
                 found.append(of_doubtful)
         return mean_evidence(found) if found else None
 
-    def _alone_of(self, scan: Scan, stopwatch: Stopwatch) -> Judgement:
-        """The judgement of a scan by itself, which is made once."""
-        known = self._alone.get(scan)
-        return self.model.judge_silently(scan, stopwatch) if known is None else known
+    def _alone_of(self, scan: Scan, stopwatch: Stopwatch) -> Judgement | None:
+        """The judgement of a scan by itself, which is made once; None where the model fails."""
+        if scan in self._alone:
+            return self._alone[scan]
+        try:
+            return self.model.judge_silently(scan, stopwatch)
+        except InputError:
+            return None
 
     def _rays_of(self, scan: Scan) -> Rays:
         if scan not in self._rays:
             self._rays[scan] = Rays.of(scan, self.model.threads)
         return self._rays[scan]
+
+
+def _fails(scan: Scan) -> ScanIssue:
+    """What is odd about a scan beside one that the model cannot judge."""
+    name = scan.name or "a scan"
+    return ScanIssue(
+        "beside a scan that cannot be judged",
+        f"the model cannot judge {name}, which is beside it: the rays of that show nothing",
+    )
 
 
 def added_log_odds(evidence: RayEvidence) -> NDArray[np.float64]:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.counts import Counts, intersection_over_union
+from derain.export.storage import Storage
 from derain.filters import FILTERS, PointFilter, Span, filter_from, filter_view
 from derain.scan import Scan
 from derain.views.candidates import Candidates
@@ -86,8 +86,8 @@ class Search:
     Attributes:
         trials: Trials in all, those that the storage holds already included.
         seed: Of the sampler, which draws the parameters of each trial.
-        storage: SQLite file that keeps the trials, so that a later search goes on from them; None
-            keeps nothing.
+        storage: Where the trials are kept, so that a later search goes on from them, and one at the
+            same time shares them; None keeps nothing.
         data: Names of the scans. The trials in a storage count only for the same scans, labelled
             alike.
         done: Called after each trial.
@@ -95,7 +95,7 @@ class Search:
 
     trials: int
     seed: int
-    storage: Path | None
+    storage: Storage | None
     data: Sequence[str]
     done: Callable[[], object]
 
@@ -136,8 +136,8 @@ def tune_filter(name: str, scans: Sequence[LabelledNeighbourhoods], search: Sear
 
     The first trial is that of the filter's default parameters. A search may be broken off, even in
     the midst of a trial, and started again: it then comes to the result that it would have come to.
-    For the sampler draws all trials from the first one again, and those that the storage holds are
-    given their stored IoU instead of being computed anew.
+    Several searches of one storage share the trials, and come to the same result; with the values
+    that others compute meanwhile they draw other trials than one search alone.
 
     Args:
         name: One of ``FILTERS``.
@@ -154,39 +154,25 @@ def tune_filter(name: str, scans: Sequence[LabelledNeighbourhoods], search: Sear
     import optuna
     from sqlalchemy.exc import SQLAlchemyError
 
+    from derain.export.shared_trials import SharedTrials
+
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     space, default = search_space(name), filter_from(name, {})
-
-    def objective(parameters: Mapping[str, Any]) -> float:
-        return pooled_iou(filter_from(name, parameters), scans)
-
-    # Trials are run in a study in memory, and stored one by one when they are complete: however the
-    # process is killed, the storage never holds half a trial.
-    study = optuna.create_study(
-        direction="maximize", sampler=optuna.samplers.TPESampler(seed=search.seed)
-    )
-    study.enqueue_trial({parameter: getattr(default, parameter) for parameter in space})
+    first = {parameter: getattr(default, parameter) for parameter in space}
+    kept = None if search.storage is None else search.storage.open()
+    storage = optuna.storages.get_storage(kept)  # in memory where none is to be kept
     try:
-        stored = _stored(name, scans, search)
-        known = stored.get_trials(states=[optuna.trial.TrialState.COMPLETE])
-        for number in range(max(search.trials, len(known))):
-            if number < len(known):
-                _repeat(study, known[number])
-            else:
-                trial = study.ask(_distributions(space))
-                study.tell(trial, objective(trial.params))
-                stored.add_trial(study.trials[-1])
-                search.done()
+        shared = SharedTrials(storage, name, distributions_of(name), first, search.seed)
+        _agree_on_data(shared.study, name, scans, search)
+        while trial := shared.next(search.trials):
+            shared.finish(trial, pooled_iou(filter_from(name, trial.params), scans))
+            search.done()
+        parameters, iou = shared.best()
     except (optuna.exceptions.OptunaError, SQLAlchemyError) as error:
-        # SQLAlchemy's message goes on for lines, with the statement and a link.
-        reason = str(error).splitlines()[0]
-        raise InputError(
-            str(search.storage),
-            f"cannot be used as storage ({reason})",
-            "Name a new file that can be written.",
-        ) from error
-    best = filter_from(name, study.best_params)
-    return Tuned(best.as_dict(), study.best_value, pooled_iou(default, scans))
+        if search.storage is None:
+            raise
+        raise search.storage.refused(error) from error
+    return Tuned(filter_from(name, parameters).as_dict(), iou, pooled_iou(default, scans))
 
 
 def tune_threshold(
@@ -234,21 +220,14 @@ def pooled_iou(filter: PointFilter, scans: Sequence[LabelledNeighbourhoods]) -> 
     return total.iou
 
 
-def _stored(name: str, scans: Sequence[LabelledNeighbourhoods], search: Search) -> "optuna.Study":
-    """The study that keeps the trials: a new one, or that of the same filter in the storage.
+def _agree_on_data(
+    study: "optuna.Study", name: str, scans: Sequence[LabelledNeighbourhoods], search: Search
+) -> None:
+    """Writes into a study what its trials are computed on, or compares what is there.
 
     Raises:
-        InputError: The storage holds a study of the filter on other scans, labels, spans or
-            candidates.
+        InputError: The study is of other scans, labels, spans or candidates.
     """
-    import optuna
-
-    study = optuna.create_study(
-        storage=None if search.storage is None else f"sqlite:///{search.storage}",
-        study_name=name,
-        direction="maximize",
-        load_if_exists=True,
-    )
     facts: dict[str, Any] = {
         "scans": list(search.data),
         "rain_and_solid": [[int(s.rain.sum()), int(s.solid.sum())] for s in scans],
@@ -264,29 +243,22 @@ def _stored(name: str, scans: Sequence[LabelledNeighbourhoods], search: Search) 
         )
     for key, fact in facts.items():
         study.set_user_attr(key, fact)
-    return study
 
 
-def _repeat(study: "optuna.Study", known: "optuna.trial.FrozenTrial") -> None:
-    """Draws a trial again, and gives it the value that is stored instead of computing it."""
-    import optuna
+def distributions_of(name: str) -> "dict[str, optuna.distributions.BaseDistribution]":
+    """What the parameters of a filter are drawn from, by name.
 
-    trial = study.ask(known.distributions)
-    if trial.params == known.params:
-        study.tell(trial, known.value)
-    else:  # the stored one was drawn by another seed
-        study.tell(trial, state=optuna.trial.TrialState.FAIL)
-        study.add_trial(known)
+    Args:
+        name: One of ``FILTERS``.
 
-
-def _distributions(
-    space: Mapping[str, Span],
-) -> "dict[str, optuna.distributions.BaseDistribution]":
+    Raises:
+        InputError: A filter that cannot be tuned.
+    """
     from optuna.distributions import FloatDistribution, IntDistribution
 
     return {
-        name: IntDistribution(low, high)
+        parameter: IntDistribution(low, high)
         if isinstance(low, int) and isinstance(high, int)
         else FloatDistribution(low, high, log=True)
-        for name, (low, high) in space.items()
+        for parameter, (low, high) in search_space(name).items()
     }

@@ -2,6 +2,7 @@
 
     python -m release.build --out dist              build, compare, install and run
     python -m release.build --out dist --no-install    without the registry: build and compare
+    python -m release.build --out dist --tag v0.2.0    only where that is the tag of this version
 
 Both are built from a copy of the files that git knows, so that nothing of a working tree gets in.
 The source distribution is unpacked and must build a wheel of the same files; the wheel is then
@@ -17,6 +18,7 @@ import tempfile
 from pathlib import Path
 from zipfile import ZipFile
 
+from derain import __version__
 from derain.errors import InputError
 from release.environment import Environment
 
@@ -113,6 +115,19 @@ def prove(wheel: Path, folder: Path) -> str:
     return version + card.splitlines()[0]
 
 
+def refuse_other_tag(tag: str) -> None:
+    """Refuses a tag that names another version than derain's own.
+
+    Raises:
+        InputError: It is not ``v`` and the version.
+    """
+    own = f"v{__version__}"
+    if tag != own:
+        raise InputError(
+            tag, f"is not the tag of this version, {own}", f"Tag {own}, or raise the version first."
+        )
+
+
 def main() -> None:
     """Builds, compares, installs and runs."""
     parser = argparse.ArgumentParser(
@@ -120,7 +135,10 @@ def main() -> None:
     )
     parser.add_argument("--out", type=Path, default=Path("dist"), help="(default: %(default)s)")
     parser.add_argument("--install", action=argparse.BooleanOptionalAction, default=True)
+    parser.add_argument("--tag", help="tag of the release")
     arguments = parser.parse_args()
+    if arguments.tag is not None:
+        refuse_other_tag(arguments.tag)
     wheel, sdist = build(arguments.out)
     for file in (wheel, sdist):
         print(f"{file}: {file.stat().st_size:,} bytes")

@@ -1,6 +1,6 @@
 """What the names of folders tell: the layouts of the packaged data cards."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import get_args
@@ -12,6 +12,12 @@ from derain.files.names import scan_stem
 
 # The folder of labels where nothing else is said; only then may they lie beside the scans instead.
 USUAL_LABELS = Layout().labels
+
+
+def cards_naming(ids: Collection[int]) -> list[str]:
+    """Names of the packaged data cards that have all of some ids among their classes."""
+    cards = {name: load_card(name) for name in packaged_cards()}
+    return [name for name, card in cards.items() if set(ids) <= card.classes.keys()]
 
 
 @cache

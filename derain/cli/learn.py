@@ -6,17 +6,19 @@ describes how far to trust it, with the commands that repeat each step.
 
   derain learn recording/ --out model.onnx
   derain learn recording/ --out model.onnx --poses standing    the sensor stood still
+  derain learn recording/ --out model.onnx --teacher persistence
   derain learn recording/ --out model.onnx --model salsanext --blind
-  derain learn recording/ --out model.onnx --teacher crf       no motion needed; dim rain only
-  derain learn recording/ --out model.onnx --start default     go on from the model of derain
+  derain learn recording/ --out model.onnx --start mine.ckpt   go on from a model of yours
   derain learn recording/ --out model.onnx --rerun report.rrd  look at teacher and student
   derain learn drive.mcap --out model.onnx --topic /velodyne_points
   derain run model.onnx more_scans/ --out cleaned              what it is for
 
-The default teacher is persistence, which judges a point by the scans before and after: solid things
-stay in their place, drops do not. Labels beside the scans are not read; with --card, they measure
-the finished model, for the record. Labels, runs and report go to a folder beside the model, which a
-second run clears.
+The default teacher is the model that comes with derain, which sees the scans before and after each;
+the network begins with the weights of the same model. Where --model or --blind asks for another
+network, its weights are drawn at random. The teacher persistence goes by free space alone: solid
+things stay in their place, and drops do not. The report compares the two. Labels beside the scans
+are not read; with --card, they measure the finished model, for the record. Labels, runs and report
+go to a folder beside the model, which a second run clears.
 """
 
 import argparse
@@ -26,9 +28,10 @@ from derain.bags.names import within
 from derain.cli.options import add_columns, add_poses, add_topic, count, file_named
 from derain.cli.outputs import print_lines
 from derain.cli.playback import refuse_unusable, write_and_report
+from derain.default import DEFAULT
 from derain.sources.method import Method
 from derain.system.extras import EXPORT_LIBRARIES, TRAINING_LIBRARIES, require
-from derain.workflows.learn_config import PERSISTENCE, STUDENTS, LearnConfig
+from derain.workflows.learn_config import STUDENTS, LearnConfig
 from derain.workflows.start import START_HELP
 
 # The Rerun file shows so many scans of a long recording, spread over all of it.
@@ -43,13 +46,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=file_named(".onnx"), required=True, help="the ONNX file to write"
     )
-    parser.add_argument("--model", choices=STUDENTS, help="(default: outdet, or that of --start)")
+    parser.add_argument("--model", choices=STUDENTS, help="(default: that of --start)")
     parser.add_argument("--start", metavar="MODEL", help=START_HELP)
     parser.add_argument(
         "--teacher",
-        default=PERSISTENCE,
+        default=DEFAULT,
         metavar="METHOD",
-        help="what labels the scans: persistence, a filter such as crf, or a model (.onnx)",
+        help="what labels the scans: the model that comes with derain (%(default)s), persistence, "
+        "a filter such as crf, or a model of yours (.onnx)",
     )
     add_poses(parser)
     parser.add_argument("--epochs", type=count, help="passes over the scans (default: by model)")

@@ -167,12 +167,16 @@ def add_method_and_scans(parser: Parser, help: str) -> None:
     scans.required = False
 
 
-def method_and_scans(first: str, others: list[Place]) -> tuple[str, list[Place]]:
-    """The method and the scans that the words of ``derain run`` mean.
+def method_and_scans(
+    first: str, others: list[Place], command: str = "run", out: str = "cleaned"
+) -> tuple[str, list[Place]]:
+    """The method and the scans that the words of a command mean.
 
     Args:
         first: The first word, a method or a scan.
         others: The words after it, scans.
+        command: The command, for advice.
+        out: Folder of its results, for advice.
 
     Raises:
         InputError: A first word that is neither, or could be both where that matters; a method
@@ -187,19 +191,21 @@ def method_and_scans(first: str, others: list[Place]) -> tuple[str, list[Place]]
     named = of_method or (not path.suffix and is_method_name(first))
     if not (named or there):
         raise InputError(
-            first, "no such file", f"{method_hint(first)}, and scans after it; or scans alone."
+            first,
+            "no such method, file or folder",
+            f"{method_hint(first)}, and scans after it; or scans alone.",
         )
     # Formats come last: to look a suffix up may import what other packages bring.
     if not named and (not others or folder or in_bag or scan_suffix(path) in FORMATS):
         return DEFAULT, [path, *others]
     if others:
         return first, others
-    beside = f"`derain run {first} SCANS --out cleaned`"
+    beside = f"`derain {command} {first} SCANS --out {out}`"
     if there and not of_method:
         raise InputError(
             first,
             "it is a method's name, and a file or folder here has it, too",
-            f"Write ./{first} to have that cleaned by the model that comes with derain, or "
-            f"{beside} to clean others by the method.",
+            f"Write ./{first} to have that judged by the model that comes with derain, or "
+            f"{beside} to have others judged by the method.",
         )
     raise InputError(first, "it is a method, and no scans are named", f"Write {beside}.")

@@ -97,13 +97,11 @@ def add_columns(
         of: Whose files they are, where a command reads several kinds.
         default: What it is where it is not given; None leaves that to the command.
     """
-    action = parser.add_argument(
-        option,
-        type=column_names,
-        metavar="NAMES",
-        default=default,
-        help=f"column names for {of}files without them: %(unnamed)s "
-        f"(default: {','.join(DEFAULT_COLUMNS)})",
+    action = parser.add_argument(option, type=column_names, metavar="NAMES", default=default)
+    # Set afterwards: Python 3.14 makes the text of a help that it is given at once.
+    action.help = (
+        f"column names for {of}files without them: %(unnamed)s "
+        f"(default: {','.join(DEFAULT_COLUMNS)})"
     )
     vars(action)["unnamed"] = _UnnamedFormats()
 

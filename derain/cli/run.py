@@ -31,8 +31,8 @@ all scans. Write ./crf for a folder called crf.
 The model that comes with derain judges the scans of a recording by the scans around them, too:
 solid things are where they were, rain is not. Where the sensor was comes from the poses, or else
 from the scans; where that is not known, or with --alone, each scan is judged by itself.
-Methods that see several scans need the scans of a recording in time order. Where a method is not
-sure of a point, its best guess decides. Results of a data set are named by their paths in it.
+Methods that see several scans need the scans of a recording in time order. A point of which a
+method is not sure stays. Results of a data set are named by their paths in it.
 A bag (.bag of ROS 1; .mcap, .db3 or a folder of ROS 2) becomes a bag of the same name: the clouds
 of one topic have no rain, and everything else stays the same, byte for byte.
 derain warns once of each fault of the scans. It skips scans with more than --most-removed rain: it
@@ -63,7 +63,7 @@ from derain.cli.options import (
 )
 from derain.cli.outputs import exit_code, noting_progress, print_error, print_facts, print_lines
 from derain.cli.parser import Parser
-from derain.cli.unit_options import add_units, division_of, executor_of, threads_of_each
+from derain.cli.unit_options import add_units, division_of, executor_of, workers_of
 from derain.cli.weather_options import (
     add_weather,
     warn_of_bad_weather,
@@ -73,6 +73,7 @@ from derain.cli.weather_options import (
 from derain.default import DEFAULT, model_card
 from derain.errors import InputError
 from derain.example import Truth
+from derain.export.methods import CUES, DELAY, PAST
 from derain.export.runtime import Derainer
 from derain.files.labels import LABEL
 from derain.recordings.posed import STANDING
@@ -84,15 +85,14 @@ from derain.sources.method import Method
 from derain.sources.recordings import irregularities
 from derain.sources.store_listing import frames_at
 from derain.sources.stored_frame import StoredBag
+from derain.sources.units import spans_of
 from derain.stores.url import Place, is_url, place_of
+from derain.system.cores import threads_of
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
 from derain.views.scan_issues import MOST_RAIN, ScanIssue
 from derain.weather.record import weather_row
 from derain.workflows.odometry import placed
-
-# Scans before and after each that a model sees by default, as far as they are of its recording.
-PAST, DELAY = 1, 1
 
 # Options that only --help-all shows.
 RARE = (
@@ -101,9 +101,6 @@ RARE = (
     *("--removed-topic", "--keep-shape", "--dry", "--warning", "--error", "--hold"),
     *("--resume", "--anew", "--shard", "--dask", "--block"),
 )
-
-# The network that sees them unasked.
-CUES = "cues"
 
 
 def add_arguments(parser: Parser) -> None:
@@ -158,8 +155,6 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     keep_freed_memory()
     name, scans = method_and_scans(arguments.method, arguments.scans or [])
-    arguments.threads = threads_of_each(arguments)
-    method = method_of(name, arguments)
     frames = frames_at(scans, arguments.columns, arguments.topic)
     # Of the bags of a store, the clouds are not known before they are fetched.
     stored = [frame for frame in frames if isinstance(frame, StoredBag)]
@@ -169,11 +164,15 @@ def main(arguments: argparse.Namespace) -> int:
     source = placed(frames, arguments.poses, arguments.threads).map(
         lambda frame: frame.with_intensity_times(arguments.intensity_scale)
     )
+    alone = method_of(name, arguments)
     if arguments.probability:
-        require_probabilities(method, source)
-    # What does without the scans around each need not be warned of scans that have none.
-    needed = method.window
-    method = _over_recording(method, arguments, len(source) > 1 or bool(stored))
+        require_probabilities(alone, source)
+    several = len(source) > 1 or bool(stored)
+    method = _over_recording(alone, arguments, several)
+    workers = workers_of(arguments, lambda: len(spans_of(source, method, arguments.block)))
+    if workers > 1:
+        arguments.threads = max(threads_of(arguments.threads) // workers, 1)
+        method = _over_recording(method_of(name, arguments), arguments, several)
     weather = weather_options(arguments)
     sink = CleanSink(
         arguments.out,
@@ -186,13 +185,14 @@ def main(arguments: argparse.Namespace) -> int:
         sink,
         weather_table(arguments.weather) as rows,
         noting_progress(sink.so_far),
-        executor_of(arguments) as executor,
+        executor_of(arguments, workers) as executor,
     ):
         printer = _Printer(arguments.out, rows, arguments.json)
         if name == DEFAULT:
             printer.introduce_default()
+        # What does without the scans around each need not be warned of scans that have none.
         known = (frame for frame in source if not isinstance(frame, StoredBag))
-        for sentence in irregularities(known, needed):
+        for sentence in irregularities(known, alone.window):
             warn(sentence)
         report = clean(
             source,

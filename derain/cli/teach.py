@@ -3,17 +3,19 @@
 The labels are 0 for not rain, 1 for rain, and 255 for not known. Training and measuring leave out
 points that are not known.
 
-  derain teach persistence drive/ --out taught
-  derain teach persistence drive/ --out taught --poses poses.txt
+  derain teach drive/ --out taught
+  derain teach drive/ --out taught --poses poses.txt
   derain teach crf drive/ other_drive/ --out taught
-  derain teach default drive/ --out taught
+  derain teach persistence drive/ --out taught
   derain teach persistence WADS/sequences/36 --out taught --card wads
-  derain fit --config outdet_taught.yaml --data.root taught
+  derain fit --config cues_taught.yaml --data.root taught --start default
 
 METHOD is a method that sees several scans, a filter, the model that comes with derain (below), a
-model of your own (.onnx), or parameters from `derain tune` (.yaml). derain writes the labels, their
-data card and a list of the scans; the scans stay in their place. The last fifth of each sequence is
-the validation part. Scans without any known point are left out.
+model of your own (.onnx), or parameters from `derain tune` (.yaml). It is optional: if the first
+word is a folder or a scan, the model that comes with derain labels all scans, each by the scans
+around it, too. derain writes the labels, their data card and a list of the scans; the scans stay in
+their place. The last fifth of each sequence is the validation part. Scans without any known point
+are left out.
 With --card, the meaning of the scans' own labels, derain also compares its labels with these, for
 the record only: they do not change the result.
 """
@@ -26,12 +28,13 @@ from typing import TYPE_CHECKING
 from derain.bags.names import within
 from derain.cards.card import load_card, packaged_cards
 from derain.cards.known import layouts_for
-from derain.cli.method_options import add_method, method_of
+from derain.cli.method_options import add_method_and_scans, method_and_scans, method_of
 from derain.cli.options import add_columns, add_intensity_scale, add_json, add_poses, add_topic
 from derain.cli.outputs import exit_code, print_error, print_facts, print_lines
 from derain.cli.parser import Parser
 from derain.evaluation.counts import or_none
 from derain.evaluation.text_tables import number_text
+from derain.export.methods import over_recording
 from derain.sources.folders import named_frames
 from derain.sources.judging import Failures
 from derain.system.memory import keep_freed_memory
@@ -43,10 +46,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: Parser) -> None:
     """Declares the command's arguments."""
-    add_method(parser)
-    parser.add_argument(
-        "scans", nargs="+", type=Path, help="folders of consecutive scans, or a data set's folder"
-    )
+    add_method_and_scans(parser, help="folders of consecutive scans, or a data set's folder")
     parser.add_argument("--out", type=Path, required=True, help="folder to write to")
     parser.add_argument(
         "--card",
@@ -66,10 +66,11 @@ def main(arguments: argparse.Namespace) -> int:
     from derain.workflows.teaching import teach_recordings
 
     keep_freed_memory()
-    method = method_of(arguments.method, arguments)
+    name, scans = method_and_scans(arguments.method, arguments.scans or [], "teach", "taught")
+    method = over_recording(method_of(name, arguments))
     card = None if arguments.card is None else load_card(arguments.card)
     found = named_frames(
-        within(arguments.scans, arguments.topic),
+        within(scans, arguments.topic),
         arguments.columns,
         labelled=True,
         layouts=layouts_for(card),

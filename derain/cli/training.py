@@ -82,9 +82,10 @@ def train(arguments: list[str]) -> None:
     """
     from derain.cli.outputs import print_lines
     from derain.workflows.training import run_trainer
+    from derain.workflows.training_progress import EpochLines
 
     words = ["--help" if argument == ALL else argument for argument in arguments]
-    trainer = run_trainer(words, descriptions=EXAMPLES).trainer
+    trainer = run_trainer(words, EXAMPLES, {"callbacks": [EpochLines()]}).trainer
     best = getattr(trainer.checkpoint_callback, "best_model_path", "")
     if arguments[0] == "fit" and best and trainer.is_global_zero:
         print_lines(f"Best checkpoint: {best}")

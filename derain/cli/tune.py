@@ -4,14 +4,16 @@ It writes them for `derain run --parameters` and `derain bench --methods`.
 
   derain tune dsor --data scans/ --card wads --out dsor.yaml
   derain tune dror --data REHEARSE3D_PUBLIC --scans 100 --trials 100 --out dror.yaml
-  derain tune dror --data REHEARSE3D_PUBLIC --trials 300 --storage study.db --out dror.yaml
+  derain tune dror --data REHEARSE3D_PUBLIC --trials 300 --storage dror.journal --out dror.yaml
   derain tune outdet.onnx --data REHEARSE3D_PUBLIC --out outdet.yaml
   derain tune default --data scans/ --card wads --out default.yaml
 
 Optuna searches the parameters of a filter, starting at the defaults. The neighbours of each scan
 are found once, and take some 150 bytes per point. With --storage, a second call continues up to
---trials. With --candidates, the filter looks for rain only within bounds of range, height and
-intensity that hold a share of the rain.
+--trials, and calls at the same time share them and find the same. Several machines need a journal
+in a folder that all of them see, or a database: postgresql+psycopg://USER@HOST/DATABASE.
+With --candidates, the filter looks for rain only within bounds of range, height and intensity that
+hold a share of the rain.
 The threshold of a model follows from its probabilities, without trials.
 """
 
@@ -37,6 +39,7 @@ from derain.cli.parser import Parser
 from derain.default import DEFAULT
 from derain.errors import InputError
 from derain.export.methods import PARAMETER_SUFFIXES
+from derain.export.storage import Storage
 from derain.files.atomic import require_writable
 from derain.filters import FILTERS
 from derain.filters.derainer import CANDIDATES
@@ -67,7 +70,12 @@ def add_arguments(parser: Parser) -> None:
         metavar="SHARE",
         help="limit a filter to bounds that hold SHARE of the rain (default SHARE: %(const)s)",
     )
-    parser.add_argument("--storage", type=Path, help="SQLite file for the study of a filter")
+    parser.add_argument(
+        "--storage",
+        type=Storage,
+        metavar="PLACE",
+        help="for the trials of a filter: FILE.journal, an SQLite file, or the URL of a database",
+    )
     add_threads(parser)
 
 

@@ -1,23 +1,34 @@
 """Options of commands that divide their work into units: processes, machines, and records."""
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from derain.cli.options import count
 from derain.errors import InputError
 from derain.jobs.running import Submits
-from derain.jobs.shard import Shard
+from derain.jobs.shard import TASK, Shard
 from derain.jobs.workers import WorkerPool
 from derain.sources.units import BLOCK, Division
 from derain.system.cores import threads_of
+from derain.system.memory import total_memory
+from derain.system.notices import warn
+
+# A worker has at least so many units where there are several workers unasked: none waits for long.
+UNITS_OF_WORKER = 4
+
+# Bytes that a worker may take: scans of a million points take .8 GB.
+MEMORY_OF_WORKER = 2 * 10**9
 
 
 def add_units(parser: argparse.ArgumentParser) -> None:
     """Declares the options."""
     group = parser.add_argument_group("many scans")
     group.add_argument(
-        "--workers", type=count, metavar="N", help="processes, which share the threads (default: 1)"
+        "--workers",
+        type=count,
+        metavar="N",
+        help="processes, which share the threads (default: one per thread for many scans, else 1)",
     )
     group.add_argument(
         "--dask",
@@ -65,6 +76,10 @@ def division_of(arguments: argparse.Namespace) -> Division:
         InputError: Options that exclude each other.
     """
     of_shard = arguments.shard or Shard.of_environment()
+    if of_shard is not None and of_shard.of_array:
+        warn(
+            f"{TASK} is {of_shard.number + of_shard.first}: one share is done; --shard 0/1 does all"
+        )
     if arguments.anew and of_shard is not None:
         raise InputError(
             "--anew", "excludes shares of the work", "Give --out another folder instead."
@@ -73,16 +88,33 @@ def division_of(arguments: argparse.Namespace) -> Division:
     return Division(arguments.block, of_shard, resume, arguments.anew)
 
 
-def threads_of_each(arguments: argparse.Namespace) -> int:
-    """Threads of each process, which share those of the command; 0 stands for every core."""
-    if arguments.dask is not None:
-        return int(arguments.threads or 1)  # a worker of Dask does a unit in each of its threads
-    return max(threads_of(arguments.threads) // (arguments.workers or 1), 1)
+def workers_of(arguments: argparse.Namespace, count_units: Callable[[], int]) -> int:
+    """The number of processes.
+
+    Unless it is named, there are as many as threads where each has several units to do: they are
+    faster then, also on two cores (BENCHMARK.md). Otherwise there is one, as in a share of the
+    work, of which a batch system may start several on a machine.
+
+    Args:
+        arguments: The options.
+        count_units: Counts the units.
+    """
+    if arguments.workers is not None:
+        return int(arguments.workers)
+    if arguments.dask is not None or arguments.shard or Shard.of_environment():
+        return 1
+    cores = threads_of(arguments.threads)
+    fitting = min(cores, total_memory() // MEMORY_OF_WORKER)
+    return fitting if fitting > 1 and count_units() >= UNITS_OF_WORKER * fitting else 1
 
 
 @contextmanager
-def executor_of(arguments: argparse.Namespace) -> Iterator[Submits | None]:
-    """Lends the processes that the arguments name; None where this process does the work.
+def executor_of(arguments: argparse.Namespace, workers: int) -> Iterator[Submits | None]:
+    """Lends the processes that do the work; None where this process does it.
+
+    Args:
+        arguments: The options.
+        workers: Number of processes of this machine.
 
     Raises:
         InputError: Options that exclude each other, or a cluster that cannot do the work.
@@ -94,8 +126,8 @@ def executor_of(arguments: argparse.Namespace) -> Iterator[Submits | None]:
 
         with dask_executor(arguments.dask) as executor:
             yield executor
-    elif (arguments.workers or 1) > 1:
-        with WorkerPool(arguments.workers) as pool:
+    elif workers > 1:
+        with WorkerPool(workers) as pool:
             yield pool
     else:
         yield None

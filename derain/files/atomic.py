@@ -87,6 +87,23 @@ def require_writable(path: Path) -> None:
         pass
 
 
+def require_writable_folder(folder: Path) -> None:
+    """Refuses, before any work, a folder in which no file can be written. It makes none.
+
+    Args:
+        folder: The folder, which may have to be made later.
+
+    Raises:
+        InputError: Its nearest existing parent is a file, or may not be written to.
+    """
+    existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    with writing(folder):
+        if not existing.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
+        if not os.access(existing, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+
 def _target(path: Path) -> Path:
     """The file that a path leads to, which may be written anew."""
     if path.exists() and not path.is_file():

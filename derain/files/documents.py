@@ -65,7 +65,15 @@ _Loader.add_implicit_resolver(
 
 Parsed = TypeVar("Parsed")
 
-_SHORT = reprlib.Repr()
+
+class _Short(reprlib.Repr):
+    """Cuts what is long; Python refuses to write out whole numbers of thousands of digits."""
+
+    def repr_int(self, x: int, level: int) -> str:
+        return super().repr_int(x, level) if x.bit_length() < 10_000 else "a number of many digits"
+
+
+_SHORT = _Short()
 _SHORT.maxlevel, _SHORT.maxstring, _SHORT.maxother = 2, 60, 60
 
 
@@ -277,10 +285,7 @@ class Entry:
 
 def shown(value: Any) -> str:
     """A value as a message shows it: cut where it is long, however large it is."""
-    try:
-        return _SHORT.repr(value)
-    except ValueError:  # Python refuses to write out whole numbers of thousands of digits
-        return "a number of very many digits"
+    return _SHORT.repr(value)
 
 
 def short(text: str) -> str:

@@ -52,10 +52,11 @@ def _refuse_other_versions(client: Any) -> None:
     """
     try:
         versions = set(client.run(version).values())
-    except ImportError as error:
-        raise InputError(
-            "--dask", f"derain is not installed on its workers ({error})", _INSTALL
-        ) from error
+    except Exception as error:  # of which Dask keeps no more than the text
+        if "No module named" not in str(error):
+            raise
+        reason = f"its workers cannot import derain ({error})"
+        raise InputError("--dask", reason, _INSTALL) from error
     if others := versions - {derain.__version__}:
         raise InputError(
             "--dask",

@@ -4,7 +4,7 @@ import heapq
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self, TypeVar
 
 from derain.errors import InputError
@@ -25,6 +25,7 @@ class Shard:
         number: Which, from 0.
         count: How many there are.
         first: What a batch system calls the first of them.
+        of_array: Whether it is a task of a batch system's array.
 
     Raises:
         InputError: No such share.
@@ -33,6 +34,7 @@ class Shard:
     number: int
     count: int
     first: int = 0
+    of_array: bool = False
 
     def __post_init__(self) -> None:
         if not 0 <= self.number < self.count:
@@ -62,7 +64,21 @@ class Shard:
             return None
         first = int(environment.get(FIRST_TASK, "0"))
         number = int(environment[TASK]) - first
-        return cls(number, max(int(environment.get(TASKS, "1")), number + 1), first)
+        count = max(int(environment.get(TASKS, "1")), number + 1)
+        return cls(number, count, first, of_array=True)
+
+    def within(self, begun: tuple[int, int] | None) -> Self:
+        """The same task among the shares that a job was begun in.
+
+        A batch system that runs some tasks of an array again counts these alone.
+
+        Args:
+            begun: How many shares there were, and what the first was called; None for none.
+        """
+        if begun is None or not self.of_array:
+            return self
+        count, first = begun
+        return replace(self, number=self.number + self.first - first, count=count, first=first)
 
     def of(self, units: Sequence[UnitT]) -> list[UnitT]:
         """The units of this share, in their order: see :func:`shares`."""

@@ -10,6 +10,7 @@ from queue import SimpleQueue
 from typing import Any, ParamSpec, Self, TypeVar
 
 from derain.errors import InputError
+from derain.system.memory import keep_freed_memory
 from derain.system.workers import end_with_parent, without_main_module
 
 # A unit is tried so often while its process dies.
@@ -131,6 +132,7 @@ def _serve(connection: "Connection[Any, Any]") -> None:
     """Does what it is asked for until its process is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal: whoever began this ends it
     end_with_parent()
+    keep_freed_memory()
     while True:
         task = connection.recv_bytes()
         try:

@@ -76,7 +76,7 @@ class PersistenceDerainer(RecordingMethod):
 
     Poses are those of the frames. Where a frame has none, or the record of it is damaged, they are
     found as it goes, and where that fails, no evidence is taken across the gap. A scan without any
-    other is judged by itself, and nothing of it is known for sure.
+    other is judged by itself: nothing of it is known for sure, and nothing of it is called rain.
 
     Example:
         >>> scans = [derain.read_scan("scan.bin")] * 3  # a wall, and drops that stay where they are
@@ -156,7 +156,7 @@ class PersistenceDerainer(RecordingMethod):
         if judgement.known is not None and not judgement.known.any() and judgement.judged.any():
             yield ScanIssue(
                 "nothing is known for sure",
-                "no scan before or after it tells anything: it is judged by itself",
+                "no scan before or after it shows anything: nothing of it is called rain",
             )
 
     def as_dict(self) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Self
 
 from derain.errors import InputError
+from derain.files.atomic import require_writable_folder
 from derain.files.columns import with_column
 from derain.files.format import format_of
 from derain.scan import Scan
@@ -43,7 +44,7 @@ class CleanSink:
 
     Raises:
         InputError: The folder holds files that must not be overwritten, two scans have one name, or
-            options that contradict each other.
+            options that contradict each other; in the block, a folder that cannot be written.
 
     Attributes:
         folder: Folder to write to, or the path that stands for its URL.
@@ -82,6 +83,8 @@ class CleanSink:
         self._written = 0
 
     def __enter__(self) -> Self:
+        for folder in filter(None, (self._files.folder, self._files.removed)):
+            require_writable_folder(folder)
         self._bags.__enter__()
         return self
 
@@ -98,7 +101,7 @@ class CleanSink:
         yield from self._bags.targets()
 
     def write(self, judgement: Judgement) -> None:
-        """Writes a scan without its rain; a method's best guess decides where it is not sure.
+        """Writes a scan without its rain.
 
         Args:
             judgement: The scan, judged; scans of a bag come in the order of the bag.
@@ -119,7 +122,11 @@ class CleanSink:
         scan = _with_probability(frame, judgement) if self.probability else judgement.scan
         removed = None if self._files.removed is None else scan.take(rain)
         self._files.write(frame, scan.take(~rain), rain, removed)
-        self._written += 1
+        self.count(frame)
+
+    def count(self, frame: Frame) -> None:
+        """Counts a scan that is written, by this sink or by one of its :attr:`destination`."""
+        self._written += not self._bags.takes(frame)
 
     def so_far(self) -> str:
         """Number of scans in files, and of bags, that are written."""

@@ -138,8 +138,9 @@ def clean(
             job = _job(source, work, opened, division)
             units = units_of(source, method, division.block)
             job.list_units(units)
-            units = units if division.shard is None else division.shard.of(units)
-            outcomes = run(Task(job, work), units, executor)
+            if division.shard is not None:
+                units = division.shard.within(job.shards).of(units)
+            outcomes = _counted(run(Task(job, work), units, executor), opened)
         else:
             units = [whole(source)]
             outcomes = _at_once(units[0], work, opened, observer)
@@ -178,6 +179,16 @@ def _at_once(
 def _is_stored(source: Source, sink: CleanSink) -> bool:
     """Whether scans are read from an object store, or written to one."""
     return sink.destination.is_stored or any(isinstance(each, StoredFrame) for each in source)
+
+
+def _counted(
+    results: Iterator[UnitResult[FrameUnit, ScanOutcome]], sink: CleanSink
+) -> Iterator[UnitResult[FrameUnit, ScanOutcome]]:
+    """The same, whose written scans a sink counts that does not write them itself."""
+    for result in results:
+        if result.result.error is None:
+            sink.count(result.result.frame)
+        yield result
 
 
 def _keeps_records(source: Source, division: Division, folder: Place) -> bool:

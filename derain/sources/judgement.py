@@ -18,13 +18,14 @@ class Judgement:
     Attributes:
         probability: That each point is rain, float32 (N,); 0 for rows that were not judged. Of a
             method that gives no probabilities, 1 for what it calls rain.
-        rain: True for rain, bool (N,).
+        rain: True for rain, bool (N,). What is not known is never called rain: where ``known`` is
+            False, so is this, whatever was given.
         judged: True for rows that the method saw, bool (N,): not for those that cannot be judged,
             nor for points outside the grid of an image.
         scan: The scan.
         frame: Its frame; None where points were judged by themselves.
-        known: True for rows of whose answer the method is sure, bool (N,): of the others ``rain``
-            is its best guess. None of a method that knows no doubt.
+        known: True for rows of whose answer the method is sure, bool (N,). None of a method that
+            knows no doubt.
     """
 
     probability: NDArray[np.float32]
@@ -33,6 +34,10 @@ class Judgement:
     scan: Scan
     frame: Frame | None = None
     known: NDArray[np.bool_] | None = None
+
+    def __post_init__(self) -> None:
+        if self.known is not None:
+            object.__setattr__(self, "rain", self.rain & self.known)
 
     @property
     def answered(self) -> NDArray[np.bool_]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from derain.cards.card import DataCard
+from derain.cards.known import cards_naming
 from derain.errors import InputError
 from derain.scan import Scan
 from derain.sources.frame import Frame
@@ -63,9 +64,11 @@ class FrameReader:
             label = frame.label_map(label, str(frame.label_path or frame.name))
         unknown = np.setdiff1d(label, list(self.card.classes))
         if len(unknown):
+            others = cards_naming(np.unique(label).tolist())
+            either = f"Give --card {' or '.join(others)}, or name" if others else "Name"
             raise InputError(
                 frame.label_path or frame.name,
                 f"ids {unknown[:5].tolist()} are no classes of {self.card.name}",
-                "Name them in the data card.",
+                f"{either} them in the data card.",
             )
         return scan.with_label(label)

@@ -160,9 +160,9 @@ def _is_same(one: Path, other: Path) -> bool:
 
 def _real(path: Path) -> str:
     """The path of a file or folder without symbolic links."""
-    folder, name = os.path.split(os.path.abspath(path))
+    folder, name = os.path.split(path)
     real = os.path.join(_real_folder(folder), name)
-    return os.path.realpath(real) if os.path.islink(real) else real
+    return os.path.realpath(path) if name in ("", "..") or os.path.islink(real) else real
 
 
 @lru_cache(maxsize=1024)

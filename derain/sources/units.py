@@ -1,7 +1,7 @@
 """The units that a source splits into: recordings, bags, or blocks of scans of long recordings."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from hashlib import sha256
 
 from derain.errors import InputError
@@ -66,7 +66,7 @@ def units_of(source: Sequence[Frame], method: Method, block: int = BLOCK) -> lis
         The units, in the order of the source. A unit has the key of its first frame for an id, and
         the name of the bag where it is one.
     """
-    return [unit for frames in recordings_of(source) for unit in _units_of(frames, method, block)]
+    return [_unit(*span) for span in spans_of(source, method, block)]
 
 
 def whole(source: Sequence[Frame]) -> FrameUnit:
@@ -74,27 +74,32 @@ def whole(source: Sequence[Frame]) -> FrameUnit:
     return FrameUnit(id="", size=0, inputs="", frames=tuple(source))
 
 
-def _units_of(recording: list[Frame], method: Method, block: int) -> Iterator[FrameUnit]:
-    first = recording[0]
-    if isinstance(first, BagFrame | StoredBag):
-        unit = _unit(recording, 0, len(recording), Window())
-        yield replace(unit, id=first.sequence)
-        return
-    window = method.depends_on(recording)
+# Frames of a recording, where a unit of it begins and ends, and what the method sees around it.
+Span = tuple[Sequence[Frame], int, int, Window]
+
+
+def spans_of(source: Sequence[Frame], method: Method, block: int) -> list[Span]:
+    """Where the units of a source begin and end; arguments as for :func:`units_of`."""
+    return [span for each in recordings_of(source) for span in _spans_of(each, method, block)]
+
+
+def _spans_of(recording: Sequence[Frame], method: Method, block: int) -> Iterator[Span]:
+    window = (
+        None if isinstance(recording[0], BagFrame | StoredBag) else method.depends_on(recording)
+    )
     if window is None:
-        yield _unit(recording, 0, len(recording), Window())
-        return
+        window, block = Window(), len(recording)
     for begin in range(0, len(recording), block):
-        yield _unit(recording, begin, begin + block, window)
+        yield recording, begin, begin + block, window
 
 
-def _unit(recording: list[Frame], begin: int, end: int, window: Window) -> FrameUnit:
+def _unit(recording: Sequence[Frame], begin: int, end: int, window: Window) -> FrameUnit:
     frames = tuple(recording[begin:end])
     before = tuple(recording[max(begin - window.before, 0) : begin])
     after = tuple(recording[end : end + window.after])
     seen = (*before, *frames, *after)
     return FrameUnit(
-        id=frames[0].key,
+        id=frames[0].sequence if isinstance(frames[0], BagFrame) else frames[0].key,
         size=sum(map(_size, frames)),
         inputs=sha256("\n".join(map(_stamp, seen)).encode()).hexdigest()[:16],
         frames=frames,

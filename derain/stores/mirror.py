@@ -12,7 +12,6 @@ from derain.files.atomic import temporary_folder, writing
 from derain.stores.objects import StoredObject, fetch, upload
 from derain.stores.url import SCHEME, Place, is_url, path_of
 
-
 # Name of the file in a mirror that stands for others.
 EMPTY = ".empty"
 

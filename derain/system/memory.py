@@ -1,6 +1,7 @@
 """Memory of one scan that the next one reuses."""
 
 import ctypes
+import os
 
 # Parameters of mallopt, and the largest value of the second.
 # Source: glibc, malloc/malloc.h and mallopt(3).
@@ -28,3 +29,11 @@ def keep_freed_memory(kept: int = KEPT) -> None:
         return
     mallopt(MMAP_THRESHOLD, LARGEST_MMAP_THRESHOLD)
     mallopt(TRIM_THRESHOLD, kept)
+
+
+def total_memory() -> int:
+    """Bytes of the machine's memory; of systems that do not name it, none."""
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, OSError, ValueError):
+        return 0

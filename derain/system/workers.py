@@ -56,10 +56,13 @@ def without_main_module() -> Iterator[None]:
 def exit_with_launcher() -> None:
     """Ends this process when the one that began its run is gone, if that is another process.
 
-    Lightning runs the command again for each further device. If the first process is killed, the
-    others would wait for it. On Windows a lost parent is not detected.
+    Lightning runs the command again for each further device, and torchrun for each device of its
+    machine. If the first process or torchrun is killed, the others would wait for it. On Windows a
+    lost parent is not detected.
     """
-    if "LOCAL_RANK" not in os.environ:
+    if "TORCHELASTIC_RUN_ID" in os.environ:
+        os.environ[LAUNCHER] = str(os.getppid())
+    elif "LOCAL_RANK" not in os.environ:
         os.environ[LAUNCHER] = str(os.getpid())
     launcher = int(os.environ.get(LAUNCHER, os.getpid()))
     if launcher != os.getpid():

@@ -70,7 +70,8 @@ def missing_channels(scan: Scan, fill_value: Mapping[str, float], data: str) -> 
 
 
 def missing_intensity(
-    scan: Scan, consequence: str = "nothing can be found without"
+    scan: Scan,
+    consequence: str = "nothing can be found without; name its column, or take default or dror",
 ) -> Iterator[ScanIssue]:
     """Whether a scan lacks the intensity that a method needs.
 

@@ -1,26 +1,31 @@
-"""Measures a student on held-out scans: beside its teacher, and by labels where asked to."""
+"""Measures teacher and student on held-out scans: side by side, beside persistence, by labels."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import replace
+from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from derain.annotation.teach import TAUGHT_CARD, labels_of
 from derain.cards.card import DataCard, load_card
 from derain.cards.known import label_of, layouts_for
 from derain.datamodules.taught import Taught
 from derain.errors import InputError
-from derain.evaluation.answers import NOT_KNOWN, RAIN, Answers, AnswersOfScan, answer_of
+from derain.evaluation.answers import NOT_KNOWN, RAIN, Answers, AnswersOfScan, answer_of, total
 from derain.evaluation.counts import SCORES
 from derain.evaluation.text_tables import markdown_table, number_text
 from derain.pictures.answers import answers_figure
 from derain.pictures.scan_pictures import before_after_figure, save
+from derain.recordings.persistence import PersistenceDerainer
 from derain.scan import Scan
 from derain.sources.bag_frame import BagFrame
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
+from derain.sources.judging import judgements
 from derain.sources.reader import FrameReader
+from derain.sources.source import Source
 from derain.sources.spread import evenly_spaced
 from derain.workflows.learn_report import LearnResults
 from derain.workflows.teaching import TruthRecord
@@ -49,6 +54,37 @@ def teacher_answers(data: Taught) -> list[AnswersOfScan]:
         AnswersOfScan(frame.key, frame.key in keys, _answers(data, frame))
         for frame in tqdm(sorted(frames, key=_in_time), "counting", disable=None)
     ]
+
+
+def beside_persistence(data: Taught, recording: Source) -> Answers:
+    """Persistence's answers on held-out scans, and beside them what the teacher calls rain.
+
+    Args:
+        data: The scans with the teacher's labels.
+        recording: The same scans as the teacher saw them, in time order, with their poses where
+            these are known.
+
+    Raises:
+        InputError: A scan that cannot be read.
+    """
+    taught = {frame.key: frame for frame in data.frames("validation")[:MOST_EVALUATED]}
+    shown = tqdm(_with_neighbours(recording, taught), "comparing", disable=None)
+    found = []
+    for frame, judgement, _ in judgements(PersistenceDerainer(), shown):
+        if frame.key in taught:
+            rain = answer_of(data.read(taught[frame.key]), data.card) == RAIN
+            labelled = judgement.scan.with_label(labels_of(judgement))
+            found.append(Answers.of(labelled, TAUGHT_CARD, rain))
+    return total(found)
+
+
+def _with_neighbours(recording: Source, keys: Container[str]) -> list[Frame]:
+    """The frames of some keys, and those right before and after them, without labels."""
+    wanted = np.array([frame.key in keys for frame in recording], bool)
+    seen = wanted.copy()
+    seen[1:] |= wanted[:-1]
+    seen[:-1] |= wanted[1:]
+    return [frame.without_labels() for frame in compress(recording, seen)]
 
 
 def evaluate_student(

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lightning import LightningModule, Trainer
-from lightning.pytorch.callbacks import Callback, ModelCheckpoint
-from tqdm import tqdm
+from lightning.pytorch.callbacks import ModelCheckpoint
 
 from derain.workflows.training import quiet_lightning, run_trainer
+from derain.workflows.training_progress import EpochLines
 
 
 @dataclass(frozen=True)
@@ -56,14 +55,14 @@ def fit(
             the whole configuration.
         settings: Values of the options of ``derain fit``, by name: ``{"data.root": "WADS",
             "trainer.max_epochs": 5}``. They replace those of the configuration.
-        quiet: Whether one bar over the epochs stands for all that Lightning prints.
+        quiet: Whether a line for each epoch stands for all that Lightning prints.
 
     Raises:
         InputError: A configuration, option or checkpoint that cannot be used, a folder that cannot
             be written, or data that cannot be read.
     """
     options = fit_options(config, settings or {})
-    defaults = {"enable_progress_bar": False, "callbacks": [EpochBar()]} if quiet else {}
+    defaults = {"enable_progress_bar": False, "callbacks": [EpochLines()]} if quiet else {}
     with quiet_lightning() if quiet else nullcontext():
         trainer = run_trainer(["fit", *options], trainer=defaults).trainer
     best = trainer.checkpoint_callback
@@ -87,22 +86,3 @@ def fit_options(config: str | Path | None, settings: Mapping[str, Any]) -> list[
         text = str(value) if isinstance(value, str | Path) else json.dumps(value)
         words += [f"--{name}", text]
     return words
-
-
-class EpochBar(Callback):
-    """A progress bar over the epochs of a training, on terminals alone."""
-
-    def on_train_start(self, trainer: Trainer, pl_module: LightningModule) -> None:
-        """Shows the bar."""
-        hidden = None if trainer.is_global_zero else True
-        self.bar = tqdm(desc="training", total=trainer.max_epochs, unit="epoch", disable=hidden)
-
-    def on_train_epoch_end(self, trainer: Trainer, pl_module: LightningModule) -> None:
-        """Moves it on, with the IoU on the validation scans."""
-        if "val_iou" in trainer.callback_metrics:
-            self.bar.set_postfix(IoU=f"{trainer.callback_metrics['val_iou']:.3f}", refresh=False)
-        self.bar.update()
-
-    def on_train_end(self, trainer: Trainer, pl_module: LightningModule) -> None:
-        """Removes it."""
-        self.bar.close()

@@ -9,7 +9,7 @@ from pathlib import Path
 from derain.annotation.manifest import FEWEST_SCANS
 from derain.datamodules.taught import Taught
 from derain.errors import InputError
-from derain.export.methods import load_method, named_method
+from derain.export.methods import load_method, named_method, over_recording
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.files.atomic import replacing, require_writable
@@ -18,12 +18,13 @@ from derain.models.checkpoint import load_model
 from derain.recordings.posed import ODOMETRY, STANDING
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
+from derain.sources.method import Method
 from derain.sources.recordings import recordings_of
 from derain.sources.records import POSES
 from derain.sources.source import Source
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import recorded_warnings, warn
-from derain.workflows.evaluation import evaluate_student, teacher_answers
+from derain.workflows.evaluation import beside_persistence, evaluate_student, teacher_answers
 from derain.workflows.fit import fit, fit_options
 from derain.workflows.learn_config import LearnConfig, Student, student_of
 from derain.workflows.learn_report import LEAST_RAIN, LearnResults, write_report
@@ -34,8 +35,8 @@ from derain.workflows.teaching import teach_recordings
 # A folder with this file may be cleared by a second run.
 MARK = "learning.txt"
 
-# Teaching, training and export; odometry comes first where nothing states the poses.
-LEARN_STEPS = 3
+# Teaching, training, export and measuring; odometry comes first where nothing states the poses.
+LEARN_STEPS = 4
 
 
 def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
@@ -73,7 +74,10 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
     steps = Steps(show, LEARN_STEPS + config.needs_odometry(source))
     with recorded_warnings() as warnings:
         poses = _find_poses(config, source, steps)
-        _teach(config, poses, len(source), steps, warnings)
+        teacher = over_recording(load_method(*named_method(config.teacher)))
+        found = named_frames(config.recordings, config.columns, labelled=True, recordings=True)
+        recording = placed(found, poses)
+        _teach(config, teacher, recording, steps, warnings)
         data = Taught(str(config.taught))
         results = LearnResults(
             title=", ".join(map(str, config.recordings)),
@@ -82,8 +86,11 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
             model=config.out,
             path=config.work / "report.md",
             scans=teacher_answers(data),
+            persistence=beside_persistence(data, recording)
+            if config.is_compared(teacher)
+            else None,
             stood=config.poses == STANDING,
-            sees_intensity=not student.blind,
+            sees_intensity=student.sees_unit,
             warnings=warnings,
             commands=commands(config, student, source, poses),
         )
@@ -94,8 +101,10 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
         scored = trained.iou is not None
         steps.end(f"IoU {trained.iou:.3f} on held-out scans, last epoch" if scored else "trained")
         export_checkpoint(config.checkpoint, config.out, steps)
+    steps.begin("Measuring: the model on held-out scans")
     evaluate_student(results, data, Derainer(config.out), config.card)
     write_report(results)
+    steps.end(f"report: {results.path}")
     show(f"Done in {steps.elapsed}")
     return results
 
@@ -189,23 +198,21 @@ def _find_poses(config: LearnConfig, source: Source, steps: Steps) -> str | None
 
 
 def _teach(
-    config: LearnConfig, poses: str | None, scans: int, steps: Steps, warnings: Sequence[str]
+    config: LearnConfig, teacher: Method, recording: Source, steps: Steps, warnings: Sequence[str]
 ) -> None:
     """Has the teacher label the scans.
 
     Raises:
         InputError: So few scans are labelled that none of them is held out.
     """
-    found = named_frames(config.recordings, config.columns, labelled=True, recordings=True)
-    method = load_method(*named_method(config.teacher))
     steps.begin(f"Teaching: {config.teacher} labels the scans")
-    results = teach_recordings(method, placed(found, poses), config.taught, guard=_warning_of)
+    results = teach_recordings(teacher, recording, config.taught, guard=_warning_of)
     labelled = len(results.manifest.scans)
     if not results.held_out:
         reason = f": {warnings[0]}" if warnings else ""
         raise InputError(
             config.recordings[0],
-            f"only {labelled} of {scans} scans could be labelled, and a recording needs "
+            f"only {labelled} of {len(recording)} scans could be labelled, and a recording needs "
             f"{FEWEST_SCANS}{reason}",
             "Record scans that overlap.",
         )
@@ -240,7 +247,7 @@ def _refuse_clean(results: LearnResults) -> None:
             results.title,
             f"hardly any rain was found ({taught.rain_among_known:.3%} of the points that "
             f"{results.teacher} is sure of): it seems to be clean",
-            f"Record in rain. What was found: {results.path}.",
+            f"Record in rain, or take another --teacher. What was found: {results.path}.",
         )
 
 

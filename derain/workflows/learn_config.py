@@ -6,9 +6,12 @@ from pathlib import Path
 
 import yaml
 
+from derain.default import DEFAULT
 from derain.errors import InputError
+from derain.export.methods import CUES
 from derain.files import DEFAULT_COLUMNS
 from derain.recordings.posed import ODOMETRY
+from derain.sources.method import Method
 from derain.sources.source import Source
 from derain.spec import Spec
 from derain.workflows.configurations import packaged_configs
@@ -18,9 +21,6 @@ PERSISTENCE = "persistence"
 
 # Networks that learn from labels, and the beginning of their configurations' names.
 STUDENTS = ("outdet", "salsanext", "salsanext_lite", "cues")
-
-# The network that weighs intensity as each scan shows it, and does without where it has none.
-CUES = "cues"
 
 # Channels of a network that is blind to intensity, as the option `--model.channels` takes them.
 BLIND = {"outdet": "[x,y,z]", "salsanext": "[range,x,y,z]", "salsanext_lite": "[range,x,y,z]"}
@@ -33,7 +33,7 @@ class LearnConfig:
     Example:
         >>> config = LearnConfig([Path("drive")], Path("model.onnx"), epochs=5)
         >>> str(config.work), config.teacher
-        ('model_learning', 'persistence')
+        ('model_learning', 'default')
 
     Attributes:
         recordings: Folders of consecutive scans, or bags.
@@ -49,20 +49,28 @@ class LearnConfig:
         epochs: Epochs of the training; None for those of the network's configuration.
         card: Data card of the scans' own labels, which measure the finished model; None measures
             nothing.
-        start: The trained model whose weights the network begins with; None draws them at random.
+        start: The trained model whose weights the network begins with. None draws them at random
+            where a network is named, or one without intensity is asked for, and else begins with
+            the model that comes with derain.
     """
 
     recordings: Sequence[Path]
     out: Path
     folder: Path | None = None
     model: str | None = None
-    teacher: str = PERSISTENCE
+    teacher: str = DEFAULT
     poses: str | None = None
     blind: bool = False
     columns: Sequence[str] = DEFAULT_COLUMNS
     epochs: int | None = None
     card: str | None = None
     start: str | None = None
+
+    @property
+    def begins_with(self) -> str | None:
+        """The trained model whose weights the network begins with; None draws them at random."""
+        chosen = self.start is not None or self.model is not None or self.blind
+        return self.start if chosen else DEFAULT
 
     @property
     def work(self) -> Path:
@@ -80,7 +88,9 @@ class LearnConfig:
         return self.work / "student.ckpt"
 
     def needs_odometry(self, source: Source) -> bool:
-        """Whether the teacher needs poses and neither the configuration nor the scans have them.
+        """Whether poses are to be found before the teaching.
+
+        The configuration asks for that, or the teacher cannot do without and nothing states them.
 
         Args:
             source: The scans.
@@ -89,7 +99,15 @@ class LearnConfig:
             InputError: A record of poses that is damaged or does not fit the scans.
         """
         known = self.poses is not None or all(frame.pose is not None for frame in source)
-        return self.teacher == PERSISTENCE and (self.poses == ODOMETRY or not known)
+        return self.poses == ODOMETRY or (self.teacher == PERSISTENCE and not known)
+
+    def is_compared(self, teacher: Method) -> bool:
+        """Whether persistence, another teacher, can be compared with the one that is chosen.
+
+        Args:
+            teacher: The teacher. Scans suit persistence where this one sees several at a time.
+        """
+        return self.teacher != PERSISTENCE and not teacher.window.is_one_scan
 
 
 @dataclass(frozen=True)
@@ -113,6 +131,11 @@ class Student:
     settings: Mapping[str, str]
     epochs: int
 
+    @property
+    def sees_unit(self) -> bool:
+        """Whether it sees intensity in the unit of its scans; cues do as each scan shows it."""
+        return not self.blind and self.network != CUES
+
     def __str__(self) -> str:
         blind = ", blind to intensity" if self.blind else ""
         start = "" if self.start is None else f", started from {self.start}"
@@ -132,7 +155,8 @@ def student_of(config: LearnConfig, source: Source) -> Student:
             student is to be blind or the scans have none.
     """
     blind = config.blind or source[0].read().intensity is None
-    if config.start is None:
+    start = config.begins_with
+    if start is None:
         network = config.model or STUDENTS[0]
         file, settings = _configuration(network)
         if network == CUES:
@@ -141,18 +165,18 @@ def student_of(config: LearnConfig, source: Source) -> Student:
         elif blind:
             settings["model.channels"] = BLIND[network]
     else:
-        spec = _spec_of_start(config, config.start)
+        spec = _spec_of_start(config, start)
         if "intensity" in spec.channels and blind and not config.blind:
             raise InputError(
                 config.recordings[0],
-                f"has no intensities, which {config.start} sees",
-                "Give a start that is blind to intensity, or none.",
+                f"has no intensities, which {start} sees",
+                "Give a start that is blind to intensity, or name a network by --model.",
             )
         network, blind = spec.network, not spec.weighs_intensity
         file, settings = _configuration(network)
-        settings["start"] = config.start
+        settings["start"] = start
     usual = yaml.safe_load(packaged_configs()[file].read_text("utf-8"))["trainer"]["max_epochs"]
-    return Student(network, blind, config.start, file, settings, config.epochs or int(usual))
+    return Student(network, blind, start, file, settings, config.epochs or int(usual))
 
 
 def _spec_of_start(config: LearnConfig, start: str) -> Spec:

@@ -40,6 +40,11 @@ held-out scans that the teacher is sure of. A student can be better than its tea
 learn errors that the teacher makes only now and then."""
 
 
+BESIDE_PERSISTENCE = """\
+Persistence goes by free space alone: rain is what rays of the scans before and after went through,
+however bright it is. On held-out scans, beside this teacher:"""
+
+
 @dataclass
 class LearnResults:
     """What was learnt from a recording.
@@ -52,8 +57,10 @@ class LearnResults:
         path: File of the report.
         scans: The teacher's answers, scan by scan in time order.
         evaluated: The student's answers beside them on held-out scans; none before it is trained.
+        persistence: Persistence's answers on held-out scans, and beside them what the teacher calls
+            rain; None where they are not compared.
         stood: Whether the sensor stood, by the configuration.
-        sees_intensity: Whether the student does.
+        sees_intensity: Whether the student does, in the unit of this recording.
         warnings: Warnings of all steps, in order.
         pictures: What each picture shows, by file in the folder of the report.
         record: Scores by the scans' own labels, in Markdown; empty where none were measured.
@@ -67,6 +74,7 @@ class LearnResults:
     path: Path
     scans: Sequence[AnswersOfScan]
     evaluated: Sequence[AnswersOfScan] = ()
+    persistence: Answers | None = None
     stood: bool = False
     sees_intensity: bool = True
     warnings: Sequence[str] = ()
@@ -140,6 +148,8 @@ def as_markdown(results: LearnResults) -> str:
         f"## The teacher: {results.teacher}",
         _teacher_table(results.taught),
     ]
+    if results.persistence is not None:
+        parts += [BESIDE_PERSISTENCE, _persistence_table(results.persistence)]
     parts += _pictures(results.pictures, "teacher")
     if results.evaluated:
         parts += [
@@ -181,6 +191,7 @@ def doubts(results: LearnResults) -> Iterator[str]:
             f"The teacher is sure of {known:.0%} of the points only: too few scans around each, "
             "wrong poses, or a sensor whose scan pattern changes from scan to scan."
         )
+    yield from _doubts_of_teacher(results)
     if results.stood:
         yield (
             "The sensor stood: all scans show one place. Drive a little, or record in several "
@@ -191,6 +202,26 @@ def doubts(results: LearnResults) -> Iterator[str]:
         others = len(results.warnings) - 1
         more = f" (and {others} more warnings)" if others else ""
         yield f"The recording is unusual: {results.warnings[0]}{more}"
+
+
+def _doubts_of_teacher(results: LearnResults) -> Iterator[str]:
+    """Doubts that persistence raises about another teacher."""
+    if results.persistence is None:
+        return
+    known = 1 - results.persistence.shares[2]
+    if known < ENOUGH_KNOWN:
+        yield (
+            f"Persistence, beside which the teacher is compared, is sure of {known:.0%} of the "
+            "points only: nothing but the teacher itself supports most of its labels."
+        )
+    for name, band in coarse_bands(results.persistence).items():
+        rain = band.shares[1]
+        if rain > max(MORE_THAN_TAUGHT * band.removed, band.removed + MORE_BY):
+            yield (
+                f"At {name} persistence is sure that {rain:.1%} of the points are rain, and the "
+                f"teacher calls {band.removed:.1%} so: it may be blind to this rain. Compare with "
+                "`--teacher persistence`."
+            )
 
 
 def _doubts_of_student(results: LearnResults) -> Iterator[str]:
@@ -231,6 +262,15 @@ def _teacher_table(answers: Answers) -> str:
         for name, band in _bands(answers).items()
     ]
     return markdown_table(("range", "points", "not rain", "rain", "not known"), rows)
+
+
+def _persistence_table(answers: Answers) -> str:
+    rows = [
+        [name, f"{band.points:,}", *(f"{share:.1%}" for share in (*band.shares[1:], band.removed))]
+        for name, band in _bands(answers).items()
+    ]
+    header = ("range", "points", "rain to persistence", "not known to it", "rain to the teacher")
+    return markdown_table(header, rows)
 
 
 def _student_table(answers: Answers) -> str:

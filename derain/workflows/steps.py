@@ -33,13 +33,14 @@ class Steps:
 
     def end(self, result: str) -> None:
         """Shows the result of the step, and its time."""
-        self.show(f"  {_clock(time.monotonic() - self._step)}  {result}")
+        self.show(f"  {clock(time.monotonic() - self._step)}  {result}")
 
     @property
     def elapsed(self) -> str:
         """Time since the first step, as minutes and seconds."""
-        return _clock(time.monotonic() - self._start)
+        return clock(time.monotonic() - self._start)
 
 
-def _clock(seconds: float) -> str:
+def clock(seconds: float) -> str:
+    """A time as minutes and seconds."""
     return f"{int(seconds) // 60}:{int(seconds) % 60:02d}"

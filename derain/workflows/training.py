@@ -2,6 +2,7 @@
 
 import argparse
 import logging
+import os
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -15,6 +16,7 @@ from lightning.pytorch import Trainer
 from lightning.pytorch.callbacks import LearningRateMonitor, ModelCheckpoint
 from lightning.pytorch.cli import ArgsType, LightningArgumentParser, LightningCLI
 from lightning.pytorch.loggers import TensorBoardLogger
+from torch.distributed import is_torchelastic_launched
 
 # Imported so that a configuration may name them without their modules.
 from derain.datamodules.base import ScanDataModule
@@ -55,7 +57,7 @@ from derain.workflows.run_folder import (
     logging_to_run_folder,
 )
 from derain.workflows.start import START_HELP, checkpoint_of
-from derain.workflows.training_errors import as_input_error, known_options
+from derain.workflows.training_errors import HINT, as_input_error, known_options
 
 # What `--ckpt_path` may be besides a file: checkpoints that Lightning looks for itself.
 FOUND_BY_LIGHTNING = ("last", "hpc")
@@ -189,7 +191,7 @@ class DerainCLI(LightningCLI):
             InputError: Options that no trainer can be made with.
         """
         try:
-            return save_whole(super().instantiate_trainer(**kwargs))
+            return save_whole(super().instantiate_trainer(**processes_of_torchrun(), **kwargs))
         except (ValueError, TypeError) as error:  # Lightning checks some options in these ways
             raise _of_the_trainer(error) from error
 
@@ -206,9 +208,20 @@ class DerainCLI(LightningCLI):
             self.model = started(self.model, checkpoint_of(start), start)
 
 
+def processes_of_torchrun() -> dict[str, int]:
+    """The trainer's machines and devices where torchrun started this process; otherwise nothing.
+
+    Lightning's own default is one machine: every process would train alone, and write its own run.
+    """
+    if not is_torchelastic_launched():
+        return {}
+    machines, processes = os.environ["GROUP_WORLD_SIZE"], os.environ["LOCAL_WORLD_SIZE"]
+    return {"num_nodes": int(machines), "devices": int(processes)}
+
+
 def _of_the_trainer(error: Exception) -> InputError:
     """What Lightning finds wrong with its options; it names them itself."""
-    return InputError("--trainer", str(error).rstrip("."), "Correct the option that it names.")
+    return InputError("--trainer", str(error).rstrip(".!"), HINT)
 
 
 @contextmanager

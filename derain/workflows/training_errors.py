@@ -24,6 +24,14 @@ _ARGUMENT = re.compile(r"argument (?:--)?(?P<option>\S+): (?P<fault>.*)")
 _EXPECTED = re.compile(r"Expected an? <class '(?P<kind>[^']+)'>")
 _GIVEN = re.compile(r"(?:Got|Given) value: (?P<value>.*)$", re.MULTILINE)
 
+# Options that stand for themselves in other programs, and have a section here.
+OF_OTHER_PROGRAMS = {
+    "gpu": "trainer.accelerator",
+    "gpus": "trainer.devices",
+    "epochs": "trainer.max_epochs",
+    "lr": "model.learning_rate",
+}
+
 HINT = "All options: --help-all."
 
 # What only says that something below it went wrong, or where.
@@ -73,7 +81,10 @@ def as_input_error(message: str, known: Collection[str]) -> InputError:
 def _unknown(key: str, known: Collection[str]) -> InputError:
     section, dot, name = key.rpartition(".")
     renamed = f"{section}{dot}{FORMER_OPTIONS.get(name, name)}"
-    near = [renamed] if renamed in known else difflib.get_close_matches(key, known, n=1)
+    likely = [renamed, OF_OTHER_PROGRAMS.get(key, "")]
+    likely += sorted(option for option in known if option.endswith(f".{key}"))
+    likely += difflib.get_close_matches(key, known, n=1)
+    near = [option for option in likely if option in known]
     return InputError(key, "no such option", f"Did you mean {near[0]}?" if near else HINT)
 
 

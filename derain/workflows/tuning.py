@@ -12,6 +12,7 @@ from derain.cards.rain_found import require_rain
 from derain.datamodules.scan_data import ScanData
 from derain.export.methods import load_method_of_one_scan
 from derain.export.runtime import Derainer
+from derain.export.storage import Storage
 from derain.export.tuning import (
     LabelledNeighbourhoods,
     Search,
@@ -58,7 +59,7 @@ def tune_filter_on(
     trials: int,
     *,
     seed: int = 0,
-    storage: Path | None = None,
+    storage: Storage | None = None,
     candidates: Candidates | None = None,
     threads: int = 0,
 ) -> Tuned:
@@ -70,7 +71,7 @@ def tune_filter_on(
         frames: The scans.
         trials: Trials in all.
         seed: Of the sampler.
-        storage: SQLite file that keeps the trials; None keeps nothing.
+        storage: Where the trials are kept and shared; None keeps nothing.
         candidates: Bounds outside which nothing is called rain; None where anything may be.
         threads: Threads of the search for neighbours; 0 takes every core.
 
@@ -81,6 +82,8 @@ def tune_filter_on(
         InputError: A scan that cannot be read, scans without rain, or as for
             :func:`derain.export.tuning.tune_filter`.
     """
+    if storage is not None:
+        storage.open()  # before the neighbours are found, which takes long
     notices, default, neighbours = Notices(), filter_from(name, {}), neighbours_to_find(name)
     scans = []
     for frame in tqdm(frames, desc="finding neighbours", unit="scan", disable=None):

@@ -49,7 +49,8 @@ class Resumption(lightning.Callback):
         """Compares what Lightning restores next with what the run has.
 
         Raises:
-            InputError: Optimisers, schedulers or a scaler of another training.
+            InputError: Optimisers, schedulers or a scaler of another training, or a learning rate
+                that is planned for another number of steps.
         """
         checkpoint, self._checkpoint = self._checkpoint, None
         if checkpoint is None:
@@ -66,6 +67,13 @@ class Resumption(lightning.Callback):
         whole = {name: Entry(str(trainer.ckpt_path), name, checkpoint.get(name)) for name in own}
         for name in own.keys() & checkpoint.keys():
             checkpoint[name] = matching_state(whole[name], own[name])
+        for found, schedule in zip(checkpoint["lr_schedulers"], own["lr_schedulers"], strict=True):
+            planned, steps = found.get("total_steps"), schedule.get("total_steps")
+            if planned != steps:
+                raise whole["lr_schedulers"].fault(
+                    f"plans the learning rate for {planned} steps, where this run takes {steps}",
+                    "Keep max_epochs, and processes times batch_size, as they were.",
+                )
         for found, state in zip(checkpoint["optimizer_states"], optimizers, strict=True):
             if _order(found) != _order(state):
                 raise whole["optimizer_states"].fault("orders parameters otherwise", REMEDY)

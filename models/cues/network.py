@@ -121,7 +121,8 @@ class CueNetwork(nn.Module):
         features, rain = self.geometry(seen, far, others, counts)
         doubtful = torch.nonzero(rain > DOUBTFUL)[:, 0]
         cues = Cues(far, cell, distances, neighbours, others, counts, doubtful)
-        answers, features = [rain], features.index_select(1, doubtful)
+        # Transposed, each point's features are copied in one piece: faster in onnxruntime.
+        answers, features = [rain], features.T.index_select(0, doubtful).T
         for fusion in self.rounds:
             with torch.no_grad():
                 given = cues.around(answers[-1])

@@ -78,7 +78,10 @@ def test_a_method_that_is_named_is_the_one_that_cleans(
         (["crf"], "crf: it is a method's name, and a file or folder here has it, too. Write ./crf"),
         (["dror"], "dror: it is a method, and no scans are named. Write `derain run dror SCANS"),
         (["best.yaml"], "best.yaml: it is a method, and no scans are named"),
-        (["scnas/", "scans"], "scnas/: no such file. Give a model written by `derain export`"),
+        (
+            ["scnas/", "scans"],
+            "scnas/: no such method, file or folder. Give a model written by `derain export`",
+        ),
         (["scans", "scnas"], "scnas: there is no such file or folder"),
         (["notes"], "notes: '' is not the suffix of a scan"),
         (["notes", "scans"], "notes: not an ONNX model"),

@@ -68,7 +68,7 @@ def test_a_recording_becomes_a_model_and_a_report_whatever_its_labels_say(
     outcome = succeed(*command)
     steps = [line.partition(":")[0] for line in outcome.out.splitlines()]
     assert [step for step in steps if step.istitle()][:3] == ["Teaching", "Training", "Export"]
-    assert "(step 3 of 3)" in outcome.out
+    assert "(step 4 of 4)" in outcome.out
     derainer = Derainer("model.onnx")
     spec = derainer.spec
     # The student sees what its start saw.
@@ -143,7 +143,7 @@ def test_a_folder_of_something_else_is_not_cleared(refused, recording: Path) -> 
     ("scans", "options", "names"),
     [
         (2, (), "2 scans: too few to learn from some and choose by others"),
-        (3, ("--teacher", "nobody"), "derain: nobody: no such file"),
+        (3, ("--teacher", "nobody"), "derain: nobody: no such method or file"),
         (3, ("--poses", "none.txt", "--teacher", "dror"), "none.txt"),
     ],
 )
@@ -163,7 +163,8 @@ def test_scans_that_nothing_connects_are_refused_with_the_reason(run_derain) -> 
     for number in range(3):
         places = np.random.default_rng(number).uniform(-40, 40, (3000, 3)).astype(np.float32)
         np.column_stack([places, places[:, :1] * 0]).tofile(recording / f"{number:06d}.bin")
-    outcome = run_derain("learn", recording, "--out", "model.onnx")
+    command = ("learn", recording, "--out", "model.onnx", "--teacher", "persistence")
+    outcome = run_derain(*command)
     assert outcome.code == 2
     assert "no two scans of the recording could be laid upon one another" in outcome.err
     assert not Path("model.onnx").exists()
@@ -208,7 +209,8 @@ def test_a_recording_without_intensities_is_learnt_without(
         raise InputError("fit", "is not run", "")
 
     monkeypatch.setattr(learn, "fit", fit)
-    outcome = run_derain("learn", recording, "--out", "model.onnx", *QUICK, "--columns", "x,y,z")
+    command = ("learn", recording, "--out", "model.onnx", *QUICK, "--model", "outdet")
+    outcome = run_derain(*command, "--columns", "x,y,z")
     assert outcome.code == 2
     assert [settings["model.channels"] for settings in trained] == ["[x,y,z]"]
     assert "no intensities" in outcome.out

@@ -170,28 +170,25 @@ def test_intensities_of_another_unit_are_warned_of_once_and_scaled_but_not_in_th
 
 
 def test_nothing_is_left_where_the_output_cannot_be_written(
-    run_derain, onnx_model: Path, scans: Path, tmp_path: Path
+    refused, onnx_model: Path, scans: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "file").write_text("in the way")
     before = names(tmp_path)
-    outcome = run_derain("run", onnx_model, scans, "--out", tmp_path / "file/below")
-    assert (outcome.code, outcome.out) == (2, "")
-    *reports, last = outcome.said
-    for number, report in enumerate(reports, start=1):
-        assert f"{tmp_path / f'file/below/{number:06d}.bin'}: cannot be written" in report
-    assert last == "derain: 3 of 3 scans could not be cleaned"
+    for option in (["--out"], ["--out", tmp_path / "out", "--removed"]):
+        line = refused("run", onnx_model, scans, *option, tmp_path / "file/below")
+        assert f"{tmp_path / 'file/below'}: cannot be written" in line
     assert names(tmp_path) == before
 
 
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        (["none.onnx", "scans"], "derain: none.onnx: no such file."),
+        (["none.onnx", "scans"], "derain: none.onnx: no such method or file."),
         (["notes", "scans"], "derain: notes: not an ONNX"),
         (["{model}", "none"], "derain: none: there is no such file or folder."),
         (["{model}", "empty"], "derain: empty: holds no scans"),
         (["{model}", "scans", "--out", "scans"], "would overwrite scans/000001.bin. Give --out"),
-        (["drorr", "scans"], "derain: drorr: no such file. Did you mean dror?"),
+        (["drorr", "scans"], "derain: drorr: no such method, file or folder. Did you mean dror?"),
         (["ror", "scans", "--set", "radios=1"], "derain: ror: it has no parameter radios."),
         (["ror", "scans", "--set", "radius=wide"], "derain: ror: radius is 'wide'."),
         (["ror", "scans", "--parameters", "none.yaml"], "derain: none.yaml: there is no such"),

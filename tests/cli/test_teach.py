@@ -51,6 +51,15 @@ def test_it_tells_of_every_scan_and_of_all(succeed, drive: Path, tmp_path: Path)
     assert Manifest.read(out).teacher == {"method": "between", "rain_below": 7, "sure_within": 30.0}
 
 
+def test_scans_alone_are_labelled_by_the_model_that_comes_with_derain_over_the_recording(
+    succeed, drive: Path, tmp_path: Path
+) -> None:
+    for number, words in enumerate(([drive], ["default", drive])):
+        succeed("teach", *words, "--out", tmp_path / f"{number}")
+        teacher = Manifest.read(tmp_path / f"{number}").teacher
+        assert (teacher["method"], teacher["past"], teacher["delay"]) == ("default", 1, 1)
+
+
 def test_truth_is_measured_for_the_record_where_a_card_explains_it(
     succeed, drive: Path, tmp_path: Path
 ) -> None:
@@ -116,13 +125,13 @@ def test_scans_out_of_order_are_warned_of(run_derain, succeed, drive: Path, tmp_
     assert "not later" not in run_derain("teach", "dror", drive, "--out", tmp_path / "o").err
 
 
-def test_the_cleaned_recording_has_its_best_guesses(succeed, drive: Path, tmp_path: Path) -> None:
+def test_points_that_are_not_known_stay(succeed, drive: Path, tmp_path: Path) -> None:
     command = ["run", "between", drive, "--out", tmp_path / "out", "--poses", "standing"]
     outcome = succeed(*command)
     points = scene(POINTS, 1)
-    rain = points[:, 3] < 20
-    np.testing.assert_array_equal(read_labels(tmp_path / "out/000001.label", POINTS), rain)
     far = np.linalg.norm(points[:, :3], axis=1) >= 30
+    rain = (points[:, 3] < 20) & ~far
+    np.testing.assert_array_equal(read_labels(tmp_path / "out/000001.label", POINTS), rain)
     told = f"({rain.mean():.1%} of the valid), {far.mean():.1%} not known, "
     assert told in outcome.out.splitlines()[1]
     facts = json.loads(succeed(*command, "--json").out.splitlines()[1])

@@ -2,15 +2,19 @@
 
 import shlex
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
+import optuna
 import pytest
 import yaml
 
 from derain.export.bench.bench_entries import bench_entries
 from derain.export.methods import read_parameters
 from derain.export.runtime import Derainer
+from derain.export.storage import Storage
 from derain.files import read_scan
 from derain.files.labels import read_labels
 from derain.filters import FilterDerainer, filter_from
@@ -165,7 +169,9 @@ def test_the_scans_are_drawn_by_the_seed(succeed) -> None:
 
 
 def test_a_slip_of_the_pen_is_known(refused) -> None:
-    assert "dzor: no such file. Did you mean dsor?" in refused("tune", "dzor", *DATA, "--out", BEST)
+    assert "dzor: no such method or file. Did you mean dsor?" in refused(
+        "tune", "dzor", *DATA, "--out", BEST
+    )
 
 
 def test_scans_without_rain_are_refused(refused, write_labelled) -> None:
@@ -189,3 +195,61 @@ def test_what_cannot_be_written_is_refused_before_any_work(refused) -> None:
     line = refused("tune", "dsor", *DATA, "--storage", "study.db", "--out", out)
     assert "no.yaml: cannot be written" in line
     assert not Path("study.db").exists()
+
+
+COMMAND = [sys.executable, "-c", "import sys; from derain.cli.main import main; sys.exit(main())"]
+
+
+def tune_at_once(processes: int, *options: str) -> list[tuple[int, str]]:
+    """Runs so many commands at the same time; returns their exit codes and what they printed."""
+    tune = [*COMMAND, "tune", "dsor", *DATA, *options]
+    started = [
+        subprocess.Popen(
+            [*tune, "--out", f"{number}.yaml"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        for number in range(processes)
+    ]
+    printed = [process.communicate(timeout=300)[0] for process in started]
+    return [(process.returncode, text) for process, text in zip(started, printed, strict=True)]
+
+
+@pytest.mark.parametrize("storage", ["study.journal", "study.db"])
+def test_processes_share_the_trials_of_a_storage(storage: str) -> None:
+    (one, printed), other = tune_at_once(2, "--trials", "30", "--storage", storage)
+    assert one == 0, printed
+    assert other == (0, printed)
+    trials = optuna.load_study(study_name="dsor", storage=Storage(storage).open()).trials
+    complete = [trial for trial in trials if trial.state == optuna.trial.TrialState.COMPLETE]
+    assert len(complete) == 30
+    assert read_parameters(Path("0.yaml")) == read_parameters(Path("1.yaml"))
+
+
+@pytest.mark.parametrize(
+    ("place", "named"),
+    [
+        ("postgresql://me:secret@localhost:1/trials", "***@localhost:1/trials"),
+        ("postgresql+nodriver://me:secret@localhost/trials", "nodriver"),
+        ("postgresql://me:secret@localhost:port/trials", "address of a database"),
+        ("sqlite:///missing/study.db", "cannot be used as storage"),
+        ("missing/study.journal", "cannot be used as storage"),
+        ("velodyne/0.journal", "cannot be used as storage"),
+    ],
+)
+def test_a_storage_that_cannot_be_used_is_refused_in_one_line(
+    refused, place: str, named: str
+) -> None:
+    shutil.copy("velodyne/0.bin", "velodyne/0.journal")
+    line = refused("tune", "dsor", *DATA, "--storage", place, "--out", BEST)
+    assert named in line
+    assert "secret" not in line
+    assert not BEST.exists()
+
+
+def test_no_password_is_written(succeed, onnx_model: Path) -> None:
+    storage = ["--storage", "postgresql://me:secret@localhost/trials?password=secret"]
+    succeed("tune", onnx_model, *DATA, *storage, "--out", BEST)  # which needs no storage
+    assert "postgresql://me:***@localhost/trials?password=***" in BEST.read_text()
+    assert "secret" not in BEST.read_text()

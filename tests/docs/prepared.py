@@ -21,6 +21,9 @@ KEPT = Path(__file__).resolve().parents[1] / "export" / "kept"
 # Ids of rain and of the rest: of the simulation, of WADS, and of a card that a page makes.
 SIMULATED_RAIN, FALLING_SNOW, ROAD = 3, 110, 40
 
+# Metres beyond which the fog of the page of troubles returns nothing.
+FOG_ENDS = 18
+
 # Two seconds, 20,000 points a scan.
 DRIVE = "--layout street --speed 6 --sensor spinning_16 --rain 25 --sequences 1 --scans 5"
 
@@ -55,8 +58,7 @@ def prepare(folder: Path, simulated: Path) -> None:
         _put(scan, folder / "labelled", rain.astype(np.int64))
         if number < 3:
             _put(scan, folder / "scans", snow)
-    for name in ("scan.bin", "dry.bin"):
-        shutil.copy(scans[0], folder / name)
+    shutil.copy(scans[0], folder / "scan.bin")
     shutil.copy(scans[0], folder / "my_data/sequences/00/lidar")
     shutil.copy(
         folder / "labelled/000000.label", folder / "my_data/sequences/00/classes/000000.label"
@@ -68,6 +70,7 @@ def prepare(folder: Path, simulated: Path) -> None:
     shutil.copy(KEPT / "outdet.onnx", folder / "model.onnx")
     shutil.copy(KEPT / "outdet.ckpt", folder / "model.ckpt")
     _put_wads(folder / "WADS")
+    _put_troubles(folder)
 
 
 def put_networks(folder: Path, outdet: "OutDet", salsanext: "SalsaNextModule") -> None:
@@ -93,6 +96,25 @@ def _put(scan: Path, folder: Path, label: "np.ndarray[tuple[int], np.dtype[np.in
     """Copies a scan and writes its labels beside it."""
     shutil.copy(scan, folder)
     write_labels(folder / f"{scan.stem}.label", label)
+
+
+def _put_troubles(folder: Path) -> None:
+    """What may go wrong with the first of the scans: fog, units, maps, other files and folders."""
+    cloud = np.fromfile(folder / "scans/000000.bin", np.float32).reshape(-1, 4)
+    rain = semantic(read_labels(folder / "scans/000000.label", len(cloud))) == FALLING_SNOW
+    dry = cloud[~rain]
+    dry.tofile(folder / "dry.bin")
+    dry[np.linalg.norm(dry[:, :3], axis=1) < FOG_ENDS].tofile(folder / "fog.bin")
+    (cloud * np.float32([1000, 1000, 1000, 1])).tofile(folder / "millimetres.bin")
+    # Where the vehicle stands five times, three metres apart.
+    along = [cloud + np.float32([3 * place, 0, 0, 0]) for place in range(5)]
+    np.concatenate(along).tofile(folder / "map.bin")
+    for name in ("morning", "recording/velodyne", "recording/truth"):
+        (folder / name).mkdir(parents=True)
+    for name in ("morning", "recording/velodyne"):
+        shutil.copy(folder / "scans/000000.bin", folder / name)
+    shutil.copy(folder / "scans/000000.label", folder / "recording/truth")
+    (folder / "morning/positions.csv").write_text("x,y,z\n0,0,0\n")
 
 
 def _put_wads(root: Path) -> None:

@@ -1,8 +1,10 @@
-"""Every command and snippet of README.md and of the documentation's pages is run."""
+"""Every command and snippet of README.md, and of the documentation's pages and notebook, is run."""
 
-import doctest
+import io
 import re
+import sys
 from collections.abc import Callable, Iterator
+from contextlib import redirect_stdout
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -42,6 +44,9 @@ NOT_RUN = [block for blocks in BY_PAGE.values() for block in blocks if block.not
 # Times, counts and checksums are of one machine.
 NUMBER = re.compile(r"\b[\da-f]{12}\b|\d[\d,.]*")
 
+# What pages call the folder that their commands run in.
+YOUR_FOLDER = "/home/you"
+
 
 def name_of(page: Path) -> str:
     return page.relative_to(REPOSITORY).as_posix()
@@ -59,6 +64,8 @@ def page_folder(
     prepare(tmp_path, made_once("documented_drive", write_drive))
     put_networks(tmp_path, random_outdet, random_salsanext)
     monkeypatch.chdir(tmp_path)
+    # The page of troubles shows what is printed where this runtime is missing.
+    monkeypatch.setitem(sys.modules, "openvino", None)
     # The whole proof and the timing have tests of their own.
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
     monkeypatch.setattr(bench, "measure_cost", measure_in_process)
@@ -83,24 +90,27 @@ def follow(snippet: Snippet, folder: Path, namespace: dict[str, Any]) -> None:
         assert yaml.safe_load(snippet.code), snippet.place
     elif snippet.language == "python":
         code = compile(snippet.code, snippet.place, "exec")
-        if not snippet.title:
-            exec(code, namespace)
+        out = io.StringIO()
+        with redirect_stdout(out):
+            if not snippet.title:
+                exec(code, namespace)
+        if snippet.printed is not None:
+            assert same(snippet.printed, out.getvalue()), f"{snippet.place}: {out.getvalue()}"
     elif snippet.language in SHELL:
         expected = snippet.outputs if snippet.language == "console" else []
         for number, line in enumerate(snippet.commands):
             code, printed = run(snippet.arguments(line), line, folder)
-            assert code == 0, f"{snippet.place}: {line}\n{printed}"
+            assert code == snippet.exit_code, f"{snippet.place}: {line}\n{printed}"
             if expected:
+                printed = printed.replace(str(folder), YOUR_FOLDER)
                 assert same(expected[number], printed), f"{snippet.place}: {line}\n{printed}"
     else:
         assert snippet.language in SHOWN, f"{snippet.place}: {snippet.language}"
 
 
 def same(expected: str, printed: str) -> bool:
-    """Whether two outputs say the same, whatever the numbers; … stands for anything."""
-    want, got = NUMBER.sub("0", expected).replace("…", "..."), NUMBER.sub("0", printed)
-    options = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
-    return doctest.OutputChecker().check_output(want, got, options)
+    """Whether two outputs are the same but for numbers and white space."""
+    return NUMBER.sub("0", expected).split() == NUMBER.sub("0", printed).split()
 
 
 @pytest.mark.parametrize("snippet", NOT_RUN, ids=lambda snippet: snippet.place)
@@ -120,6 +130,13 @@ def test_commands_stand_in_fences(page: Path) -> None:
     """Indented, they would be run by nobody."""
     text = re.sub(r"^```.*?^```$", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
     assert not re.findall(r"^ {4}(?:derain|pip|python3?|make|tensorboard) .*", text, re.MULTILINE)
+
+
+def test_every_page_stands_in_the_navigation_once() -> None:
+    navigation = (REPOSITORY / "mkdocs.yml").read_text("utf-8")
+    named = re.findall(r"^ +- .+: (\S+\.md)$", navigation, re.MULTILINE)
+    pages = [page for page in PAGES[1:] if page.suffix == ".md"]
+    assert sorted(named) == [page.relative_to(REPOSITORY / "docs").as_posix() for page in pages]
 
 
 def test_every_name_that_derain_offers_stands_in_the_reference() -> None:

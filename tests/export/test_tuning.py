@@ -18,6 +18,7 @@ from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.export import tuning
+from derain.export.storage import Storage
 from derain.export.tuning import (
     LabelledNeighbourhoods,
     Search,
@@ -62,7 +63,8 @@ def seen() -> list[LabelledNeighbourhoods]:
 
 def search(trials: int, storage: Path | None = None, data: str = "a") -> tuple[Search, list[int]]:
     told: list[int] = []
-    return Search(trials, 0, storage, [data], lambda: told.append(1)), told
+    place = None if storage is None else Storage(str(storage))
+    return Search(trials, 0, place, [data], lambda: told.append(1)), told
 
 
 @pytest.mark.parametrize("name", FILTERS)
@@ -145,10 +147,10 @@ def test_a_stored_study_goes_on_with_the_same_scans_and_labels_alone(
 
 
 def trials_in(storage: Path) -> list[tuple[dict[str, float], float]]:
-    """Parameters and values of the trials of DSOR's study, all of which are complete."""
+    """Parameters and values of the complete trials of DSOR's study."""
     study = optuna.load_study(study_name="dsor", storage=f"sqlite:///{storage}")
-    assert all(trial.state == optuna.trial.TrialState.COMPLETE for trial in study.trials)
-    return [(trial.params, trial.value) for trial in study.trials]
+    complete = study.get_trials(states=[optuna.trial.TrialState.COMPLETE])
+    return [(trial.params, trial.value) for trial in complete]
 
 
 def test_a_search_broken_off_in_the_midst_of_a_trial_ends_as_an_unbroken_one(
@@ -167,7 +169,7 @@ def test_a_search_broken_off_in_the_midst_of_a_trial_ends_as_an_unbroken_one(
         with pytest.raises(KeyboardInterrupt):
             tune_filter("dsor", seen, search(12, storage)[0])
     assert len(trials_in(storage)) == 11
-    # A running trial that nobody runs is no trial.
+    # A trial that no search of ours entered is nobody's.
     optuna.load_study(study_name="dsor", storage=f"sqlite:///{storage}").ask()
     assert tune_filter("dsor", seen, search(12, storage)[0]) == unbroken
 

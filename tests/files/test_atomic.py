@@ -11,7 +11,13 @@ import pytest
 
 from derain import InputError
 from derain.files import atomic
-from derain.files.atomic import lock, remove_abandoned, replacing, temporary_folder
+from derain.files.atomic import (
+    lock,
+    remove_abandoned,
+    replacing,
+    require_writable_folder,
+    temporary_folder,
+)
 
 
 def write(path: Path) -> None:
@@ -102,6 +108,16 @@ def test_a_folder_without_permission_is_an_error(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
     with pytest.raises(InputError, match=r"cannot be written \(Permission denied\)"):
         write(tmp_path / "scan.bin")
+    with pytest.raises(InputError, match=r"out/below: cannot be written \(Permission denied\)"):
+        require_writable_folder(tmp_path / "out/below")
+
+
+def test_a_folder_to_be_made_is_looked_at_and_not_made(tmp_path: Path) -> None:
+    require_writable_folder(tmp_path / "out/below")
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match=r"file/below: cannot be written"):
+        require_writable_folder(tmp_path / "file/below")
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
 @pytest.mark.parametrize("name", [f"{'a' * 251}.bin", f".{'é' * 127}"])

@@ -125,4 +125,4 @@ def test_values_are_cut_in_messages() -> None:
         nested = [nested] * 9  # as aliases stand for one another: 43 million, were it written out
     assert len(shown(nested)) < 400
     assert len(shown({str(n): "y" * 10_000 for n in range(100)})) < 400
-    assert shown(16**10_000) == "a number of very many digits"
+    assert shown(16**10_000) == "a number of many digits"

@@ -136,7 +136,7 @@ def test_a_filter_is_called_what_it_is_registered_by_and_its_numbers_are_checked
             "ror: it has no parameter radios. Did you mean radius? It has neighbours, radius.",
         ),
         ("ror", {"radius": -1}, "ror: radius is -1. Give a finite number"),
-        ("ror", {"radius": 16**5000}, "ror: radius is a number of very many digits."),
+        ("ror", {"radius": 16**5000}, "ror: radius is a number of many digits."),
         ("dsor", {"range_multiplier": float("inf")}, "dsor: range_multiplier is inf."),
         ("ssr", {"threshold": True}, "ssr: threshold is True."),
         ("ssr", {"neighbours": 1}, "ssr: neighbours is 1. Give a whole number from 2"),

@@ -54,8 +54,24 @@ def test_the_tasks_of_a_slurm_array_are_counted_from_its_first() -> None:
         "SLURM_ARRAY_TASK_MIN": "5",
         "SLURM_ARRAY_TASK_COUNT": "4",
     }
-    assert Shard.of_environment(environment) == Shard(2, 4, first=5)
+    task = Shard.of_environment(environment)
+    assert task == Shard(2, 4, first=5, of_array=True)
     assert Shard.of_environment({}) is None
+    assert task.within(None) == task
+
+
+def test_tasks_that_are_run_again_do_the_shares_that_the_job_was_begun_in() -> None:
+    environment = {
+        "SLURM_ARRAY_TASK_ID": "17",
+        "SLURM_ARRAY_TASK_MIN": "3",
+        "SLURM_ARRAY_TASK_COUNT": "5",
+    }
+    task = Shard.of_environment(environment)
+    assert task is not None
+    assert task.within((100, 1)) == Shard(16, 100, first=1, of_array=True)
+    with pytest.raises(InputError, match="no share 17 of 10"):
+        task.within((10, 0))
+    assert Shard(1, 2).within((100, 1)) == Shard(1, 2)
 
 
 def test_a_share_that_is_not_there_is_refused() -> None:

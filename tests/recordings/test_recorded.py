@@ -9,27 +9,41 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from derain.errors import InputError
+from derain.errors import InputError, ScanWarning
 from derain.export.recorded import RecordedDerainer, added_log_odds
 from derain.export.runtime import Derainer
 from derain.recordings.rays import RayEvidence
 from derain.scan import Scan
 from derain.sources.frame import MemoryFrame
 from derain.sources.judgement import Judgement
-from derain.sources.judging import judgements
+from derain.sources.judging import Failures, judgements
 from derain.system.stopwatch import Stopwatch
 from derain.views.window import Window
 
 from .test_persistence import drive, is_drop
 
+FAILS = "a scan that makes the network fail"
+
 
 class Doubtful(Derainer):
-    """Doubts every drop, and one of ten points of walls; takes all else for solid."""
+    """Doubts every drop, and one of ten points of walls; takes all else for solid.
+
+    It fails where a scan is called so.
+    """
 
     def judge_silently(self, points: Scan, stopwatch: Stopwatch | None = None) -> Judgement:
+        if points.name == FAILS:
+            raise InputError(self.name, f"its scores of {points.name} are none", "Look at it.")
         doubted = is_drop(points) | (np.arange(len(points)) % 10 == 0)
         probability = np.where(doubted, np.float32(0.3), np.float32(0.001))
         return Judgement(probability, probability > 0.4, points.valid, points)
+
+
+class Unreadable(MemoryFrame):
+    """A frame whose file is damaged."""
+
+    def read(self) -> Scan:
+        raise InputError(self.name, "is damaged", "Give another.")
 
 
 @pytest.fixture(scope="module")
@@ -89,6 +103,42 @@ def test_a_scan_that_is_there_twice_is_reported_and_one_of_which_nothing_is_know
         *_, last = [judgement for _, judgement, _ in judgements(method, [first, follower])]
         kinds = [issue.kind for issue in method.issues(last)]
         assert ("unlike the scans around it" in kinds) is unlike
+
+
+@pytest.mark.parametrize("wrong", ["unreadable", "empty", "nothing but NaN", "makes it fail"])
+@pytest.mark.parametrize("posed", [True, False], ids=["poses", "odometry"])
+def test_scans_beside_one_that_fails_are_judged_without_it(
+    model: Derainer, posed: bool, wrong: str
+) -> None:
+    first, beside, last = drive(3, posed=posed)
+    broken = {
+        "unreadable": Unreadable(key=beside.key, number=1, scan=beside.scan),
+        "empty": replace(beside, scan=Scan.of(np.zeros((0, 4)))),
+        "nothing but NaN": replace(beside, scan=Scan.of(np.full((50, 4), np.nan))),
+        "makes it fail": replace(beside, scan=replace(beside.scan, name=FAILS)),
+    }[wrong]
+    failures = Failures(lambda error: None)
+    method = RecordedDerainer(model, 1, 1)
+    answers = {
+        frame.number: judgement
+        for frame, judgement, _ in judgements(
+            method, [first, broken, last], failures.skipping_failures
+        )
+    }
+    fails = wrong in ("unreadable", "makes it fail")
+    assert (len(failures.errors), len(answers)) == ((1, 2) if fails else (0, 3))
+    for number in (0, 2):
+        alone = model.judge(answers[number].scan).probability
+        np.testing.assert_array_equal(answers[number].probability, alone)
+
+
+def test_a_scan_that_fails_is_named_once_to_those_beside_it(model: Derainer) -> None:
+    frames = drive(4)
+    frames[1] = replace(frames[1], scan=replace(frames[1].scan, name=FAILS))
+    failures = Failures(lambda error: None)
+    with pytest.warns(ScanWarning) as caught:
+        list(judgements(RecordedDerainer(model, 1, 1), frames, failures.skipping_failures))
+    assert sum(FAILS in str(warning.message) for warning in caught) == 1
 
 
 def test_a_copy_begins_a_recording_of_its_own(model: Derainer) -> None:

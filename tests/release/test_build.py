@@ -9,12 +9,14 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
+import yaml
 
 from derain import __version__
 from derain.errors import InputError
-from release.build import REPOSITORY, build, content_of, refuse_difference
+from release.build import REPOSITORY, build, content_of, refuse_difference, refuse_other_tag
 
-SETUPTOOLS = tomllib.loads((REPOSITORY / "pyproject.toml").read_text("utf-8"))["tool"]["setuptools"]
+PYPROJECT = tomllib.loads((REPOSITORY / "pyproject.toml").read_text("utf-8"))
+SETUPTOOLS = PYPROJECT["tool"]["setuptools"]
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +35,12 @@ def test_their_names_tell_the_one_version(distributions: tuple[Path, Path]) -> N
     wheel, sdist = distributions
     assert wheel.name == f"derain-{__version__}-py3-none-any.whl"
     assert sdist.name == f"derain-{__version__}.tar.gz"
-    assert f"version: {__version__}\n" in (REPOSITORY / "CITATION.cff").read_text("utf-8")
+
+
+def test_the_citation_names_the_version_and_the_address_of_pyproject() -> None:
+    citation = yaml.safe_load((REPOSITORY / "CITATION.cff").read_text("utf-8"))
+    assert citation["version"] == __version__
+    assert citation["repository-code"] == PYPROJECT["project"]["urls"]["Repository"]
 
 
 def test_the_wheel_holds_every_file_of_the_packages_and_no_other(wheel: Path) -> None:
@@ -83,3 +90,10 @@ def test_a_file_that_the_source_distribution_lacks_is_named() -> None:
             {"derain/default/model.onnx": b"1", "derain/x.py": b"1", "derain/y.py": b""},
             {"derain/x.py": b"2", "derain/y.py": b""},
         )
+
+
+@pytest.mark.parametrize("tag", ["v0.0.0", __version__, f"v{__version__}.1", ""])
+def test_a_tag_of_another_version_is_refused(tag: str) -> None:
+    refuse_other_tag(f"v{__version__}")
+    with pytest.raises(InputError, match=f"v{__version__}"):
+        refuse_other_tag(tag)

@@ -36,7 +36,25 @@ subprocess.run([sys.executable, __file__], env={**os.environ, "LOCAL_RANK": "1"}
 """
 
 
-@pytest.mark.parametrize("program", [HAS_A_WORKER, HAS_A_RANK], ids=["worker", "rank"])
+# torchrun starts all processes of its machine, and leaves them alone when it is killed.
+HAS_A_PROCESS_OF_TORCHRUN = """
+import os, subprocess, sys, time
+from derain.system.workers import exit_with_launcher
+
+if "LOCAL_RANK" in os.environ:
+    exit_with_launcher()
+    print("at work", flush=True)
+    time.sleep(600)
+told = {"LOCAL_RANK": "0", "TORCHELASTIC_RUN_ID": "none"}
+subprocess.run([sys.executable, __file__], env={**os.environ, **told})
+"""
+
+
+@pytest.mark.parametrize(
+    "program",
+    [HAS_A_WORKER, HAS_A_RANK, HAS_A_PROCESS_OF_TORCHRUN],
+    ids=["worker", "rank", "torchrun"],
+)
 def test_no_process_outlives_the_one_that_it_works_for(tmp_path: Path, program: str) -> None:
     (tmp_path / "program.py").write_text(program)
     environment = {k: v for k, v in os.environ.items() if k != "LOCAL_RANK"}
@@ -64,7 +82,7 @@ def test_an_error_does_not_wait_for_what_workers_are_at() -> None:
     assert isinstance(work[0].exception(), BrokenProcessPool)
 
 
-@pytest.mark.parametrize("environment", [{}, {"LOCAL_RANK": "1"}], ids=["alone", "by torchrun"])
+@pytest.mark.parametrize("environment", [{}, {"LOCAL_RANK": "1"}], ids=["alone", "by hand"])
 def test_a_process_that_nobody_of_ours_began_goes_on_without_its_parent(
     monkeypatch: pytest.MonkeyPatch, environment: dict[str, str]
 ) -> None:

@@ -9,13 +9,17 @@ from small_bags import small_bag
 from derain.annotation.teach import teach
 from derain.cards.card import load_card
 from derain.datamodules.taught import Taught
+from derain.evaluation.answers import NOT_KNOWN, RAIN
 from derain.evaluation.counts import Counts
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
 from derain.filters import DROR, FilterDerainer
+from derain.recordings.persistence import PersistenceDerainer
+from derain.recordings.posed import with_poses
 from derain.scan import Scan
 from derain.sources.folders import named_frames
-from derain.workflows.evaluation import scores_by_labels
+from derain.sources.judging import judgements
+from derain.workflows.evaluation import beside_persistence, scores_by_labels
 
 DROPS = np.arange(300) >= 270
 
@@ -70,3 +74,25 @@ def test_labels_that_cannot_be_used_are_named(data: Taught, tmp_path: Path, card
     label(tmp_path, rain=65535)
     text = scores_by_labels(data.frames("validation"), data.card, card, student)
     assert text.startswith("Nothing could be measured: ")
+
+
+def test_persistence_sees_the_scans_around_those_held_out(tmp_path: Path) -> None:
+    drive = tmp_path / "drive/velodyne"
+    drive.mkdir(parents=True)
+    for number in range(12):
+        scene(2000, seed=number).tofile(drive / f"{number:02}.bin")
+    teach(FilterDerainer(DROR()), named_frames([drive]), tmp_path / "taught")
+    data = Taught(str(tmp_path / "taught"))
+    recording = with_poses(named_frames([drive]), "standing")
+    answers = beside_persistence(data, recording)
+    whole = [judgement for _, judgement, _ in judgements(PersistenceDerainer(), recording)]
+    held_out = whole[-len(data.frames("validation")) :]
+    assert 1 < len(held_out) < len(whole)
+    expected = [
+        sum(int((one.scan.valid & ~one.answered).sum()) for one in held_out),
+        sum(int(one.rain.sum()) for one in held_out),
+    ]
+    assert [*answers.table.sum(axis=(0, 2))[[NOT_KNOWN, RAIN]]] == expected
+    assert min(expected) > 0
+    by_teacher = [data.card.rain_of(data.read(frame)) for frame in data.frames("validation")]
+    assert answers.table[..., 1].sum() == sum(rain.sum() for rain in by_teacher)

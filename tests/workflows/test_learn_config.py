@@ -39,19 +39,32 @@ def test_a_network_is_trained_by_its_configuration_without_intensity_where_it_is
 ) -> None:
     scans, dark = write_scans(tmp_path / "scans"), write_scans(tmp_path / "dark", columns=3)
     plain = Student("outdet", False, None, "outdet_taught.yaml", {}, 20)
-    assert student_of(config(tmp_path / "scans"), scans) == plain
+    assert student_of(config(tmp_path / "scans", model="outdet"), scans) == plain
     asked = student_of(config(tmp_path / "scans", model="salsanext", blind=True), scans)
     assert (asked.config, asked.settings) == (
         "salsanext_taught.yaml",
         {"model.channels": "[range,x,y,z]"},
     )
-    forced = student_of(config(tmp_path / "dark", epochs=3), dark)
+    forced = student_of(config(tmp_path / "dark", model="outdet", epochs=3), dark)
     assert (forced.blind, forced.settings, forced.epochs) == (
         True,
         {"model.channels": "[x,y,z]"},
         3,
     )
     assert str(forced) == "outdet, blind to intensity"
+
+
+@pytest.mark.parametrize("columns", [3, 4])
+def test_it_begins_with_the_model_of_derain_unless_another_is_asked_for(
+    tmp_path: Path, columns: int
+) -> None:
+    scans = write_scans(tmp_path / "scans", columns)
+    unasked = student_of(config(tmp_path / "scans"), scans)
+    settings = {"start": "default"}
+    assert unasked == Student("cues", False, "default", "cues_taught.yaml", settings, 10)
+    for asked in ({"model": "cues"}, {"model": "outdet"}, {"blind": True}):
+        assert student_of(config(tmp_path / "scans", **asked), scans).start is None
+    assert student_of(config(tmp_path / "scans", blind=True), scans).blind
 
 
 def test_a_student_sees_what_its_start_sees(tmp_path: Path) -> None:

@@ -39,11 +39,14 @@ def results_of(
 
 GOOD = answers(not_rain=90_000, rain=9_000, unknown=1_000, removed=(300, 8_500, 500))
 
+# Persistence's answers, and beside them those of a teacher that finds a third of its rain.
+BLIND = answers(not_rain=90_000, rain=9_000, unknown=1_000, removed=(0, 3_000, 0))
+
 
 def test_good_results_raise_no_doubt_but_that_of_units() -> None:
     (doubt,) = doubts(results_of(GOOD, GOOD))
     assert "intensity" in doubt
-    assert not list(doubts(results_of(GOOD, GOOD, sees_intensity=False)))
+    assert not list(doubts(results_of(GOOD, GOOD, sees_intensity=False, persistence=GOOD)))
 
 
 @pytest.mark.parametrize(
@@ -53,6 +56,8 @@ def test_good_results_raise_no_doubt_but_that_of_units() -> None:
         (results_of(answers(100_000, 500)), "Little rain was found (0.50%"),
         (results_of(GOOD, scans=8), "4 scans to learn from are few"),
         (results_of(answers(5_000, 1_000, 4_000)), "sure of 60% of the points"),
+        (results_of(GOOD, persistence=BLIND), "At 10-20 m persistence is sure that 9.0%"),
+        (results_of(GOOD, persistence=answers(10, 0, 90)), "sure of 10% of the points only"),
         (results_of(GOOD, stood=True), "The sensor stood"),
         (results_of(GOOD, GOOD, warnings=["a: far apart", "b"]), "a: far apart (and 1 more"),
         (results_of(GOOD, answers(90_000, 900, removed=(0, 900, 0))), "found 900 points of rain"),
@@ -84,6 +89,9 @@ def test_the_tables_hold_the_counts() -> None:
     text = as_markdown(results_of(GOOD, answers(500, 0)))
     (row,) = [line for line in text.splitlines() if line.startswith("| 10-20 m |    500 |")]
     assert [cell.strip() for cell in row.split("|")[3:-1]] == ["0.0%", "-", "-", "-"]
+    text = as_markdown(results_of(GOOD, persistence=BLIND))
+    (row,) = [line for line in text.splitlines() if line.startswith("| 10-20 m | 100,000 |")]
+    assert [cell.strip() for cell in row.split("|")[3:-1]] == ["9.0%", "1.0%", "3.0%"]
     # Before the training, the report is of the teacher alone.
     text = as_markdown(results_of(GOOD, pictures={Path("work/teacher.png"): "shares"}))
     assert "![shares](teacher.png)" in text

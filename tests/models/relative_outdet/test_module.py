@@ -7,6 +7,7 @@ import lightning
 import numpy as np
 import pytest
 import torch
+from lightning.pytorch.callbacks import ModelCheckpoint
 
 from derain.cards.card import load_card
 from derain.datamodules.in_memory import InMemory
@@ -91,3 +92,22 @@ def test_a_checkpoint_gives_the_same(trained: RelativeOutDet, tmp_path: Path) ->
 def test_too_small_a_neighbourhood_is_refused() -> None:
     with pytest.raises(InputError, match="neighbours"):
         RelativeOutDet(neighbours=3)
+
+
+def test_a_training_of_one_cycle_goes_on_with_steps_of_as_many_scans_alone(tmp_path: Path) -> None:
+    scans = [labelled(seed) for seed in range(2)]
+
+    def fit(batch_size: int, checkpoint: Path | None = None) -> lightning.Trainer:
+        every = ModelCheckpoint(tmp_path, filename="{epoch}", save_top_k=-1)
+        trainer = lightning.Trainer(
+            max_epochs=2, callbacks=[every], logger=False, enable_progress_bar=False
+        )
+        data = InMemory(scans, scans, card="wads", loading=Loading(batch_size=batch_size))
+        trainer.fit(RelativeOutDet(), data, ckpt_path=checkpoint)
+        return trainer
+
+    assert fit(batch_size=2).global_step == 2
+    first = tmp_path / "epoch=0.ckpt"
+    assert fit(batch_size=2, checkpoint=first).global_step == 2
+    with pytest.raises(InputError, match="learning rate for 2 steps, where this run takes 4"):
+        fit(batch_size=1, checkpoint=first)

@@ -1,0 +1,15 @@
+"""Trains, measures and predicts as a process of torchrun, which gives each command its turn.
+
+torchrun ... two_machines.py CONFIG CHECKPOINT
+"""
+
+import sys
+
+from derain.cli.main import main
+
+if __name__ == "__main__":
+    config, checkpoint = sys.argv[1:]
+    main(["fit", "--config", config])
+    for command in ("validate", "test", "predict"):
+        code = main([command, "--config", config, "--ckpt_path", checkpoint])
+        assert code == 0, command
