@@ -1,6 +1,7 @@
 """URLs of object stores: as a user writes them, as messages show them, and as paths."""
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 from derain.errors import InputError
@@ -25,6 +26,22 @@ def is_web(place: Place) -> bool:
 def place_of(text: str) -> Place:
     """The place that a user names: a URL as it is, anything else as a path."""
     return text if is_url(text) else Path(text)
+
+
+def paths_of(places: Iterable[Place]) -> list[Path]:
+    """Places that are all on this machine.
+
+    Raises:
+        InputError: One of them is a URL.
+    """
+    paths = []
+    for place in places:
+        if is_url(place):
+            raise InputError(
+                without_secrets(str(place)), "is not on this machine", "Copy it to a folder first."
+            )
+        paths.append(Path(place))
+    return paths
 
 
 def without_secrets(text: str) -> str:

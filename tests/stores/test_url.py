@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from derain.errors import InputError
-from derain.stores.url import is_url, path_of, place_of, url_of, without_secrets
+from derain.stores.url import is_url, path_of, paths_of, place_of, url_of, without_secrets
 
 
 @pytest.mark.parametrize("url", ["s3://bucket", "s3://bucket/drives/a b.bin", "https://host/a.bin"])
@@ -20,6 +20,12 @@ def test_a_path_stands_for_each_url(url: str) -> None:
 def test_paths_of_this_machine_are_no_urls(text: str) -> None:
     assert not is_url(text)
     assert place_of(text) == Path(text)
+
+
+def test_what_works_in_folders_alone_refuses_urls() -> None:
+    assert paths_of(["drives", Path("more")]) == [Path("drives"), Path("more")]
+    with pytest.raises(InputError, match=r"s3://bucket/drives: is not on this machine"):
+        paths_of(["drives", "s3://me:secret@bucket/drives"])
 
 
 @pytest.mark.parametrize("path", ["drives/a.bin", "/drives/s3:/a", "a:b/c"])
