@@ -155,6 +155,7 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     keep_freed_memory()
     name, scans = method_and_scans(arguments.method, arguments.scans or [])
+    alone = method_of(name, arguments)
     frames = frames_at(scans, arguments.columns, arguments.topic)
     # Of the bags of a store, the clouds are not known before they are fetched.
     stored = [frame for frame in frames if isinstance(frame, StoredBag)]
@@ -164,7 +165,6 @@ def main(arguments: argparse.Namespace) -> int:
     source = placed(frames, arguments.poses, arguments.threads).map(
         lambda frame: frame.with_intensity_times(arguments.intensity_scale)
     )
-    alone = method_of(name, arguments)
     if arguments.probability:
         require_probabilities(alone, source)
     several = len(source) > 1 or bool(stored)
