@@ -27,6 +27,7 @@ from derain.files.reading import is_file
 from derain.filters import FILTERS
 from derain.recordings.registry import METHODS
 from derain.sources.method import Method
+from derain.stores.url import Place, is_url, place_of
 
 # Suffixes of files that name a method, or, as a checkpoint does, are refused as one.
 METHOD_SUFFIXES = (".onnx", CHECKPOINT_SUFFIX, *PARAMETER_SUFFIXES)
@@ -160,15 +161,15 @@ def add_method_and_scans(parser: Parser, help: str) -> None:
         help: What the scans are.
     """
     add_method(parser, metavar="[METHOD]")
-    scans = parser.add_argument("scans", nargs="+", type=Path, metavar="SCAN", help=help)
+    scans = parser.add_argument("scans", nargs="+", type=place_of, metavar="SCAN", help=help)
     # Where only one word is given it goes to the method, and the words are sorted afterwards. Were
     # it the method that is not required, `run dror --out cleaned scans/` would be misread.
     scans.required = False
 
 
 def method_and_scans(
-    first: str, others: list[Path], command: str = "run", out: str = "cleaned"
-) -> tuple[str, list[Path]]:
+    first: str, others: list[Place], command: str = "run", out: str = "cleaned"
+) -> tuple[str, list[Place]]:
     """The method and the scans that the words of a command mean.
 
     Args:
@@ -181,6 +182,8 @@ def method_and_scans(
         InputError: A first word that is neither, or could be both where that matters; a method
             without scans.
     """
+    if is_url(first):
+        return DEFAULT, [first, *others]
     path = or_example(Path(first))
     folder, in_bag = os.path.isdir(path), split(path) is not None
     there = folder or in_bag or is_file(path)

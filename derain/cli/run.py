@@ -10,6 +10,7 @@ format of the input with all its fields.
   derain run dror scans/ --out cleaned --removed removed
   derain run drive.mcap --out cleaned --removed-topic /rain
   derain run scans/ --out cleaned --weather weather.csv
+  derain run s3://bucket/drives --out s3://bucket/cleaned
 
   derain run model.onnx scans/ more/scan.pcd --out cleaned --threads 2 --json
   derain run model.onnx nuscenes/ --out cleaned --columns x,y,z,intensity,ring
@@ -51,7 +52,6 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from derain.bags.names import within
 from derain.cli.method_options import add_method_and_scans, method_and_scans, method_of
 from derain.cli.options import (
     add_columns,
@@ -76,14 +76,17 @@ from derain.example import Truth
 from derain.export.methods import CUES, DELAY, PAST
 from derain.export.runtime import Derainer
 from derain.files.labels import LABEL
+from derain.recordings.posed import STANDING
 from derain.sources.clean_sink import CleanSink, require_probabilities
 from derain.sources.cleaned_bags import RAIN_PROBABILITY, BagOptions
 from derain.sources.cleaned_scan import ScanOutcome
 from derain.sources.cleaning import CleaningObserver, CleanReport, clean
-from derain.sources.folders import named_frames
 from derain.sources.method import Method
 from derain.sources.recordings import irregularities
+from derain.sources.store_listing import frames_at
+from derain.sources.stored_frame import StoredBag
 from derain.sources.units import spans_of
+from derain.stores.url import Place, is_url, place_of
 from derain.system.cores import threads_of
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
@@ -102,8 +105,8 @@ RARE = (
 
 def add_arguments(parser: Parser) -> None:
     """Declares the command's arguments."""
-    add_method_and_scans(parser, help="scans, folders of scans, or a data set's folder")
-    parser.add_argument("--out", type=Path, required=True, help="folder to write to")
+    add_method_and_scans(parser, help="scans, folders of scans, a data set's folder, or URLs")
+    parser.add_argument("--out", type=place_of, required=True, help="folder or URL to write to")
     add_json(parser)
     add_columns(parser)
     add_intensity_scale(parser)
@@ -116,7 +119,7 @@ def add_arguments(parser: Parser) -> None:
         "1 cleans every scan)",
     )
     parser.add_argument(
-        "--removed", type=Path, metavar="DIR", help="write the removed points to DIR"
+        "--removed", type=place_of, metavar="DIR", help="write the removed points to DIR"
     )
     parser.add_argument(
         "--probability", action="store_true", help=f"add the column {RAIN_PROBABILITY} to the scans"
@@ -153,20 +156,26 @@ def main(arguments: argparse.Namespace) -> int:
     keep_freed_memory()
     name, scans = method_and_scans(arguments.method, arguments.scans or [])
     division = division_of(arguments)
-    frames = named_frames(within(scans, arguments.topic), arguments.columns)
+    alone = method_of(name, arguments)
+    frames = frames_at(scans, arguments.columns, arguments.topic)
+    # Of the bags of a store, the clouds are not known before they are fetched.
+    stored = [frame for frame in frames if isinstance(frame, StoredBag)]
+    if stored and arguments.poses not in (None, STANDING):
+        reason = f"{stored[0].name} is in a store, and its clouds are not known before the run"
+        raise InputError("--poses", reason, "Copy the bag to this machine.")
     source = placed(frames, arguments.poses, arguments.threads).map(
         lambda frame: frame.with_intensity_times(arguments.intensity_scale)
     )
-    alone = method_of(name, arguments)
     if arguments.probability:
         require_probabilities(alone, source)
-    method = _over_recording(alone, arguments, len(source))
+    several = len(source) > 1 or bool(stored)
+    method = _over_recording(alone, arguments, several)
     workers = workers_of(arguments, lambda: len(spans_of(source, method, arguments.block)))
     if workers > 1 or arguments.dask is not None:
         # A worker of Dask does a unit in each of its threads.
         shared = 1 if arguments.dask and not arguments.threads else threads_of(arguments.threads)
         arguments.threads = max(shared // workers, 1)
-        method = _over_recording(method_of(name, arguments), arguments, len(source))
+        method = _over_recording(method_of(name, arguments), arguments, several)
     weather = weather_options(arguments)
     sink = CleanSink(
         arguments.out,
@@ -185,7 +194,8 @@ def main(arguments: argparse.Namespace) -> int:
         if name == DEFAULT:
             printer.introduce_default()
         # What does without the scans around each need not be warned of scans that have none.
-        for sentence in irregularities(source, alone.window):
+        known = (frame for frame in source if not isinstance(frame, StoredBag))
+        for sentence in irregularities(known, alone.window):
             warn(sentence)
         report = clean(
             source,
@@ -203,7 +213,7 @@ def main(arguments: argparse.Namespace) -> int:
     return code or warn_of_bad_weather(report.weather, arguments.fail_at)
 
 
-def _over_recording(method: Method, arguments: argparse.Namespace, scans: int) -> Method:
+def _over_recording(method: Method, arguments: argparse.Namespace, several: bool) -> Method:
     """The method that sees the scans around each, where the command line or the model asks for it.
 
     Raises:
@@ -215,7 +225,7 @@ def _over_recording(method: Method, arguments: argparse.Namespace, scans: int) -
         raise InputError("--alone", reason, "Leave it out.")
     if asked and not isinstance(method, Derainer):
         raise InputError("--past, --delay", "are options of models", "Leave them out.")
-    of_itself = isinstance(method, Derainer) and method.spec.network == CUES and scans > 1
+    of_itself = isinstance(method, Derainer) and method.spec.network == CUES and several
     if isinstance(method, Derainer) and (asked or (of_itself and not arguments.alone)):
         from derain.export.recorded import RecordedDerainer  # a single scan needs no odometry
 
@@ -229,7 +239,7 @@ def _over_recording(method: Method, arguments: argparse.Namespace, scans: int) -
 class _Printer(CleaningObserver):
     """Prints what is done to the scans, and makes a row of a table of the weather of each."""
 
-    def __init__(self, out: Path, rows: list[Sequence[object]], as_json: bool) -> None:
+    def __init__(self, out: Place, rows: list[Sequence[object]], as_json: bool) -> None:
         self._out = out
         self._notices = Notices()
         self._rows = rows
@@ -263,7 +273,8 @@ class _Printer(CleaningObserver):
         """Adds a row to the table, and prints a line."""
         self.found(outcome)
         print_facts(asdict(outcome.figures), str(outcome.figures), self._as_json)
-        self._example.add(outcome.frame.name, self._out / f"{outcome.frame.key}{LABEL}")
+        if not is_url(self._out):
+            self._example.add(outcome.frame.name, Path(self._out, f"{outcome.frame.key}{LABEL}"))
 
     def found(self, outcome: ScanOutcome) -> None:
         """Adds a row to the table."""

@@ -2,6 +2,7 @@
 
   derain status cleaned
   derain status worlds --json
+  derain status s3://bucket/cleaned
 
 A unit is a recording, a bag, or a block of scans of a long recording; of simulate it is a sequence.
 Runs of more than 50 scans keep a record of each unit in the folder of --out, and so do runs by
@@ -13,7 +14,6 @@ The exit code is 2 unless all units are done.
 
 import argparse
 import json
-from pathlib import Path
 
 from derain.cli.outputs import print_lines
 from derain.cli.parser import Parser
@@ -21,6 +21,7 @@ from derain.jobs.job import Job
 from derain.jobs.record import Record
 from derain.jobs.status import JobStatus, job_status
 from derain.sources.cleaned_totals import CleanedTotals
+from derain.stores.url import place_of
 
 # At most so many failed units are printed with their reasons.
 MOST_FAILED = 20
@@ -28,7 +29,7 @@ MOST_FAILED = 20
 
 def add_arguments(parser: Parser) -> None:
     """Declares the command's arguments."""
-    parser.add_argument("out", type=Path, metavar="OUT", help="folder that --out named")
+    parser.add_argument("out", type=place_of, metavar="OUT", help="folder or URL that --out named")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 

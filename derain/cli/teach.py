@@ -43,6 +43,7 @@ from derain.export.methods import over_recording
 from derain.sources.folders import named_frames
 from derain.sources.judging import Failures
 from derain.sources.units import spans_of
+from derain.stores.url import paths_of
 from derain.system.cores import threads_of
 from derain.system.memory import keep_freed_memory
 from derain.workflows.odometry import placed
@@ -79,7 +80,7 @@ def main(arguments: argparse.Namespace) -> int:
     method = over_recording(method_of(name, arguments))
     card = None if arguments.card is None else load_card(arguments.card)
     found = named_frames(
-        within(scans, arguments.topic),
+        within(paths_of(scans), arguments.topic),
         arguments.columns,
         labelled=True,
         layouts=layouts_for(card),

@@ -5,21 +5,19 @@ record ``units/<id>.json`` for each unit that is done or failed. Each file is wr
 """
 
 import json
-import os
-import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from hashlib import sha256
-from pathlib import Path
 from typing import Any, Self, TypeVar
 
 from derain.errors import InputError
-from derain.files.atomic import replacing, temporary_folder, writing
 from derain.jobs.record import Record
 from derain.jobs.shard import Shard
 from derain.jobs.unit import Unit
+from derain.stores.documents import Documents, documents_at
+from derain.stores.url import Place, without_secrets
 
 FOLDER = ".derain"
 JOB, UNITS, RECORDS = "job.json", "units.json", "units"
@@ -32,20 +30,20 @@ class Job:
     """What is done in a folder, and by which options.
 
     Attributes:
-        folder: The folder of the results.
+        folder: The folder of the results, a path or a URL.
         options: Texts, numbers, true or false by name, among them the command and derain's version:
             all of what the results depend on but the inputs.
         shards: How many shards it was begun in, and what a batch system calls the first of them;
             None where it was begun as a whole.
     """
 
-    folder: Path
+    folder: Place
     options: Mapping[str, Any]
     shards: tuple[int, int] | None = None
 
     @classmethod
     def begin(
-        cls, folder: Path, options: Mapping[str, Any], shard: Shard | None, anew: bool = False
+        cls, folder: Place, options: Mapping[str, Any], shard: Shard | None, anew: bool = False
     ) -> Self:
         """Begins a job, or goes on with the one of the folder.
 
@@ -59,41 +57,44 @@ class Job:
         Raises:
             InputError: The folder is of a job with other options, or cannot be written.
         """
-        with writing(folder):
-            if anew:
-                shutil.rmtree(folder / FOLDER, ignore_errors=True)
-            # As a reader will see it: tuples are lists there.
-            ours = cls(
-                folder,
-                json.loads(json.dumps(options)),
-                None if shard is None else (shard.count, shard.first),
-            )
-            begun = ours if ours._claim() else cls.at(folder)
+        # As a reader will see it: tuples are lists there.
+        ours = cls(
+            folder,
+            json.loads(json.dumps(options)),
+            None if shard is None else (shard.count, shard.first),
+        )
+        if anew:
+            ours._documents.remove_all()
+        written = {"options": ours.options, "shards": ours.shards}
+        ours._documents.create(JOB, json.dumps(written, indent=1))
+        begun = cls.at(folder)  # another command may have been quicker
         ours._refuse_other(begun)
         return begun
 
     @classmethod
-    def at(cls, folder: Path) -> Self:
+    def at(cls, folder: Place) -> Self:
         """The job of a folder.
 
         Raises:
             InputError: There is none.
         """
         try:
-            read = json.loads((folder / FOLDER / JOB).read_bytes())
+            read = _parsed(documents_at(folder, FOLDER).read(JOB))
             shards = read["shards"]
             return cls(folder, dict(read["options"]), None if shards is None else tuple(shards))
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError) as error:
+            if isinstance(error, InputError):  # the store cannot be reached
+                raise
             raise InputError(
-                folder,
+                without_secrets(str(folder)),
                 "holds no records of a job",
                 "Name the folder that --out named, of a run over several recordings.",
             ) from error
 
     @staticmethod
-    def is_begun(folder: Path) -> bool:
+    def is_begun(folder: Place) -> bool:
         """Whether a folder has a job."""
-        return (folder / FOLDER / JOB).exists()
+        return documents_at(folder, FOLDER).read(JOB) is not None
 
     @cached_property
     def fingerprint(self) -> str:
@@ -107,7 +108,7 @@ class Job:
             InputError: They cannot be written.
         """
         listed = [[unit.id, unit.size, unit.inputs] for unit in units]
-        _write(self.folder / FOLDER / UNITS, listed)
+        self._documents.write(UNITS, json.dumps(listed))
 
     def shard_of(self, units: list[UnitT], shard: Shard | None) -> list[UnitT]:
         """The units of a shard, in their order.
@@ -120,7 +121,7 @@ class Job:
 
     def listed(self) -> list[Unit]:
         """The units of the last command that went on with it."""
-        listed = _read(self.folder / FOLDER / UNITS) or []
+        listed = _parsed(self._documents.read(UNITS)) or []
         return [Unit(id=id_, size=size, inputs=inputs) for id_, size, inputs in listed]
 
     def record(self, record: Record) -> None:
@@ -129,43 +130,38 @@ class Job:
         Raises:
             InputError: It cannot be written.
         """
-        _write(self._path(record.unit), asdict(record))
+        self._documents.write(_name(record.unit), json.dumps(asdict(record)))
 
-    def record_of(self, unit: Unit) -> Record | None:
-        """The record of a unit; None where it was not done with these inputs and options."""
-        read = _read(self._path(unit.id))
+    def records_of(self, units: Sequence[UnitT]) -> Iterator[tuple[UnitT, Record | None]]:
+        """The record of each unit; None where it was not done with these inputs and options.
+
+        Args:
+            units: The units.
+
+        Raises:
+            InputError: The store cannot be reached.
+        """
+        contents = self._documents.read_each([_name(unit.id) for unit in units])
+        for unit, content in zip(units, contents, strict=True):
+            yield unit, self._record_of(unit, content)
+
+    def _record_of(self, unit: Unit, content: bytes | None) -> Record | None:
         try:
-            record = Record(**read)
+            record = Record(**_parsed(content))
         except TypeError:  # none, or that of another version
             return None
         unchanged = (unit.inputs, self.fingerprint) == (record.inputs, record.options)
         return record if unchanged else None
 
-    def _path(self, unit: str) -> Path:
-        return self.folder / FOLDER / RECORDS / f"{unit}.json"
-
-    def _claim(self) -> bool:
-        """Writes its options, unless another job has written some."""
-        path = self.folder / FOLDER / JOB
-        if path.exists():
-            return False
-        with temporary_folder(path.parent) as temporary:
-            written = temporary / JOB
-            text = json.dumps({"options": self.options, "shards": self.shards}, indent=1)
-            written.write_text(text, "utf-8")
-            try:
-                os.link(written, path)  # unlike os.replace, it fails where another was quicker
-            except FileExistsError:
-                return False
-            except OSError:  # a file system without links
-                os.replace(written, path)
-        return True
+    @property
+    def _documents(self) -> Documents:
+        return documents_at(self.folder, FOLDER)
 
     def _refuse_other(self, begun: "Job") -> None:
         """Refuses to go on with a job that was begun by other options."""
         if changed := differences(begun.options, self.options):
             raise InputError(
-                self.folder,
+                without_secrets(str(self.folder)),
                 f"was begun by other options: {changed}",
                 "Give --out another folder, or --anew to have all of it done again.",
             )
@@ -186,13 +182,12 @@ def differences(begun: Mapping[str, Any], now: Mapping[str, Any]) -> str:
     )
 
 
-def _write(path: Path, content: Any) -> None:
-    with replacing(path) as temporary:
-        temporary.write_text(json.dumps(content), "utf-8")
+def _name(unit: str) -> str:
+    return f"{RECORDS}/{unit}.json"
 
 
-def _read(path: Path) -> Any:
-    """The content of a file; None where it is not there, or damaged."""
-    with suppress(OSError, ValueError):
-        return json.loads(path.read_bytes())
+def _parsed(content: bytes | None) -> Any:
+    """What a document holds; None where it is not there, or damaged."""
+    with suppress(ValueError):
+        return None if content is None else json.loads(content)
     return None

@@ -101,12 +101,13 @@ class Task(Generic[UnitT, ResultT]):
             )
         self.work.check()
 
-    def done(self, unit: UnitT) -> list[ResultT] | None:
-        """The results of a unit by its record; None where it is to be done."""
-        record = self.job.record_of(unit)
-        if record is None or record.errors or not self.work.is_there(unit):
-            return None
-        return [self.work.from_json(unit, written) for written in record.results]
+    def done(self, units: Sequence[UnitT]) -> Iterator[tuple[UnitT, list[ResultT] | None]]:
+        """The results of each unit by its record; None where it is to be done."""
+        for unit, record in self.job.records_of(units):
+            if record is None or record.errors or not self.work.is_there(unit):
+                yield unit, None
+            else:
+                yield unit, [self.work.from_json(unit, written) for written in record.results]
 
     def do(self, unit: UnitT) -> Iterator[ResultT]:
         """Does a unit and yields its results; its record is there at the end."""
@@ -167,8 +168,7 @@ def run(
         InputError: The executor has ended, or its processes cannot do the work.
     """
     if executor is None:
-        for unit in units:
-            done = task.done(unit)
+        for unit, done in task.done(units):
             for result in task.do(unit) if done is None else done:
                 yield UnitResult(unit, result, done is not None)
     else:
@@ -183,8 +183,7 @@ def completed(task: Task[UnitT, ResultT], units: Sequence[UnitT]) -> list[Result
         units: All units of the job.
     """
     results: list[ResultT] = []
-    for unit in units:
-        done = task.done(unit)
+    for _, done in task.done(units):
         if done is None:
             return None
         results += done
@@ -196,8 +195,7 @@ def _by(
 ) -> Iterator[UnitResult[UnitT, ResultT]]:
     pickled = pickle.dumps(task)
     waiting: deque[tuple[UnitT, list[ResultT] | None, Any]] = deque()
-    for unit in units:
-        done = task.done(unit)
+    for unit, done in task.done(units):
         future = executor.submit(do_unit, pickled, unit) if done is None else None
         waiting.append((unit, done, future))
         while waiting and (len(waiting) > AHEAD or waiting[0][2] is None or waiting[0][2].done()):

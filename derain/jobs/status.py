@@ -3,12 +3,12 @@
 from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 from derain.jobs.job import Job
 from derain.jobs.record import Record
 from derain.jobs.shard import array_expression, shard_numbers
 from derain.jobs.unit import Unit
+from derain.stores.url import Place
 
 
 @dataclass(frozen=True)
@@ -42,11 +42,11 @@ class JobStatus:
         return array_expression([number_of[unit] + first for unit in to_do])
 
 
-def job_status(folder: Path, on_done: Callable[[Record], None]) -> JobStatus:
+def job_status(folder: Place, on_done: Callable[[Record], None]) -> JobStatus:
     """Reads the records of a job.
 
     Args:
-        folder: The folder of its results.
+        folder: The folder of its results, a path or a URL.
         on_done: Receives the record of each unit that is done, in the order of the units.
 
     Raises:
@@ -56,8 +56,7 @@ def job_status(folder: Path, on_done: Callable[[Record], None]) -> JobStatus:
     units = job.listed()
     failed, missing = [], []
     seconds: dict[str, float] = defaultdict(float)
-    for unit in units:
-        record = job.record_of(unit)
+    for unit, record in job.records_of(units):
         if record is None:
             missing.append(unit)
             continue

@@ -1,8 +1,8 @@
 """Scans without their rain: files in a folder, and whole bags written anew."""
 
 from collections.abc import Iterator
-from dataclasses import asdict
-from functools import partial
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Self
 
@@ -17,6 +17,9 @@ from derain.sources.judgement import Judgement
 from derain.sources.method import Method
 from derain.sources.sink import FolderSink
 from derain.sources.source import Source
+from derain.sources.stored_frame import StoredBag
+from derain.stores.mirror import uploaded
+from derain.stores.url import Place, is_url, is_web, path_of, url_of, without_secrets
 
 
 class CleanSink:
@@ -33,7 +36,7 @@ class CleanSink:
         20
 
     Args:
-        folder: Folder to write to, made if missing.
+        folder: Folder to write to, made if missing; or a URL, to which a run in units writes.
         source: The scans.
         removed: Folder for the removed points of files; None leaves them out.
         probability: Whether the written scans have the column ``rain_probability``.
@@ -44,8 +47,8 @@ class CleanSink:
             options that contradict each other; in the block, a folder that cannot be written.
 
     Attributes:
-        folder: Folder to write to.
-        for_scans: Makes a sink with the same folder and options for another source.
+        folder: Folder to write to, or the path that stands for its URL.
+        destination: By which any process opens a sink alike for other scans.
         options: What is written, true or false or a name each.
     """
 
@@ -58,19 +61,19 @@ class CleanSink:
         probability: bool = False,
         bags: BagOptions = BagOptions(),
     ) -> None:
-        self.folder = Path(folder)
+        self.destination = Destination(folder, removed, probability, bags)
+        self.folder = _path_of(folder)
         self.probability = probability
-        removed = None if removed is None else Path(removed)
-        # The same for other scans, also in another process.
-        self.for_scans = partial(
-            CleanSink, self.folder, removed=removed, probability=probability, bags=bags
-        )
         self.options = {"removed": removed is not None, "probability": probability, **asdict(bags)}
         self._source = source
-        self._files = FolderSink(self.folder, again=False, removed=removed)
+        removed_folder = None if removed is None else _path_of(removed)
+        self._files = FolderSink(self.folder, again=False, removed=removed_folder)
+        for frame in source:
+            if isinstance(frame, StoredBag):
+                self._refuse_own_bag(frame)
         self._files.refuse_clashes(source)
         self._bags = CleanedBags(self.folder, source, bags, probability)
-        in_bag = next(filter(self._bags.takes, source), None)
+        in_bag = next(filter(self._is_in_bag, source), None)
         if removed is not None and in_bag is not None:
             raise InputError(
                 "--removed",
@@ -91,7 +94,9 @@ class CleanSink:
     def targets(self) -> Iterator[Path]:
         """Every file and bag that it may write."""
         for frame in self._source:
-            if not self._bags.takes(frame):
+            if isinstance(frame, StoredBag):
+                yield self.folder / frame.written_name
+            elif not self._bags.takes(frame):
                 yield from self._files.files_of(frame)
         yield from self._bags.targets()
 
@@ -102,8 +107,13 @@ class CleanSink:
             judgement: The scan, judged; scans of a bag come in the order of the bag.
 
         Raises:
-            InputError: It cannot be written.
+            InputError: It cannot be written, or the folder is a URL: :func:`derain.clean` opens a
+                sink for each unit, whose files are uploaded together.
         """
+        if self.destination.is_stored:
+            raise InputError(
+                url_of(self.folder), "is written to in units", "Give the sink to derain.clean."
+            )
         frame, rain = judgement.frame, judgement.rain
         assert frame is not None
         if self._bags.takes(frame):
@@ -115,7 +125,7 @@ class CleanSink:
         self.count(frame)
 
     def count(self, frame: Frame) -> None:
-        """Counts a scan that is written, by this sink or by one of its :attr:`for_scans`."""
+        """Counts a scan that is written, by this sink or by one of its :attr:`destination`."""
         self._written += not self._bags.takes(frame)
 
     def so_far(self) -> str:
@@ -127,6 +137,71 @@ class CleanSink:
         )
         counts = (f"{written:,} of {there:,} {what}" for written, there, what in parts if there)
         return f"{' and '.join(counts)} are written, each of them whole"
+
+    def _is_in_bag(self, frame: Frame) -> bool:
+        return isinstance(frame, StoredBag) or self._bags.takes(frame)
+
+    def _refuse_own_bag(self, bag: StoredBag) -> None:
+        target = self.folder / bag.written_name
+        if target in (bag.path, bag.path.parent) or target.is_relative_to(bag.path):
+            raise InputError(
+                url_of(self.folder), f"would overwrite {bag.name}", "Give --out another folder."
+            )
+
+
+@dataclass(frozen=True)
+class Destination:
+    """Where scans are written without their rain, and what is written of them.
+
+    Attributes:
+        folder: The folder, a path or a URL.
+        removed: Folder for the removed points of files, a path or a URL; None leaves them out.
+        probability: Whether the written scans have the column ``rain_probability``.
+        bags: What is written of the clouds of bags.
+    """
+
+    folder: Place
+    removed: Place | None
+    probability: bool
+    bags: BagOptions
+
+    @property
+    def is_stored(self) -> bool:
+        """Whether it is in an object store, even in part."""
+        return is_url(self.folder) or (self.removed is not None and is_url(self.removed))
+
+    @contextmanager
+    def opened(self, source: Source) -> Iterator[CleanSink]:
+        """Lends a sink; what it writes is at its place when the block has ended well.
+
+        Args:
+            source: The scans.
+
+        Raises:
+            InputError: A folder or a store that cannot be written, or what CleanSink refuses.
+        """
+        with ExitStack() as stack:
+            folder = stack.enter_context(uploaded(self.folder))
+            removed = None
+            if self.removed is not None:
+                removed = stack.enter_context(uploaded(self.removed))
+            yield stack.enter_context(self._sink(folder, removed, source))
+
+    def holds(self, source: Source) -> bool:
+        """Whether everything is there that is written of scans; of a store, their record says so.
+
+        Args:
+            source: The scans.
+        """
+        if self.is_stored:
+            return True
+        sink = self._sink(self.folder, self.removed, source)
+        return all(path.exists() for path in sink.targets())
+
+    def _sink(self, folder: Place, removed: Place | None, source: Source) -> CleanSink:
+        return CleanSink(
+            folder, source, removed=removed, probability=self.probability, bags=self.bags
+        )
 
 
 def require_probabilities(method: Method, source: Source) -> None:
@@ -153,6 +228,21 @@ def require_probabilities(method: Method, source: Source) -> None:
         except InputError:  # reported when its turn comes
             continue
         _refuse_nameless(frame, scan)
+
+
+def _path_of(place: Place) -> Path:
+    """The path of a folder, or the one that stands for its URL.
+
+    Raises:
+        InputError: It is on a web server.
+    """
+    if is_web(place):
+        raise InputError(
+            without_secrets(str(place)),
+            "a web server takes no results",
+            "Name a folder, or a URL such as s3://bucket/cleaned.",
+        )
+    return path_of(str(place)) if is_url(place) else Path(place)
 
 
 def _with_probability(frame: Frame, judgement: Judgement) -> Scan:

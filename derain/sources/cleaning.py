@@ -1,8 +1,9 @@
 """Cleans the scans of a source, and reports what was done."""
 
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tqdm import tqdm
@@ -16,6 +17,7 @@ from derain.sources.folders import GivenScans, source_of
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
 from derain.sources.source import Source
+from derain.sources.stored_frame import StoredFrame
 from derain.sources.unit_cleaning import UnitCleaning
 from derain.sources.units import Division, FrameUnit, units_of, whole
 from derain.sources.weather_monitor import WeatherMonitor, WeatherOptions
@@ -99,13 +101,14 @@ def clean(
     Args:
         source: A source; or one or more scans, frames, files and folders, in time order.
         method: A model, a filter, or a method that sees several scans.
-        sink: Folder to write to, or a sink with its options, opened by ``with``.
+        sink: Folder or URL to write to, or a sink with its options, opened by ``with``.
         most_removed: Scans with a greater share of rain in their valid points are not written.
         weather: How the weather is measured.
         observer: Follows the cleaning.
         division: How the scans are divided into units. Where there are more scans than a block has,
             a record of each unit is kept in the folder, by which a run that was stopped goes on.
-            None keeps no records, unless there is an executor.
+            None keeps no records, unless there is an executor, or a source or a sink in an object
+            store.
         executor: Does the units: an executor of :mod:`concurrent.futures` or the like, whose
             processes find all files by the same paths. None does them in this process.
 
@@ -123,9 +126,12 @@ def clean(
     failures: list[InputError] = []
     before = 0
     with nullcontext(sink) if isinstance(sink, CleanSink) else CleanSink(sink, source) as opened:
-        work = UnitCleaning(method, method.fingerprint(), opened.for_scans, most_removed, measured)
-        division = Division(resume=True) if division is None and executor is not None else division
-        if division is not None and division.keeps_records(source, opened.folder):
+        work = UnitCleaning(
+            method, method.fingerprint(), opened.destination, most_removed, measured
+        )
+        if executor is not None or _is_stored(source, opened):
+            division = replace(division or Division(), resume=True)
+        if division is not None and division.keeps_records(source, opened.destination.folder):
             job = _job(source, work, opened, division)
             units = units_of(source, method, division.block)
             job.list_units(units)
@@ -135,8 +141,10 @@ def clean(
             units = [whole(source)]
             outcomes = _at_once(units[0], work, opened, observer)
         scans = sum(len(unit.frames) for unit in units)
+        found = Counter[str]()
         for result in tqdm(outcomes, total=scans, unit="scan", disable=None):
             outcome = result.result
+            found[result.unit.id] += 1
             observer.noticed(outcome.frame.name, outcome.issues)
             if outcome.error is not None:
                 failures.append(outcome.error)
@@ -151,6 +159,8 @@ def clean(
                 observer.cleaned(outcome)
             before += result.before
             cleaned.append(outcome.figures)
+    # How many clouds the bags of a store have shows only when they are fetched.
+    scans = sum(max(len(unit.frames), found[unit.id]) for unit in units)
     return CleanReport(cleaned, failures, monitor, before, scans - len(cleaned))
 
 
@@ -160,6 +170,11 @@ def _at_once(
     """Cleans scan after scan, without records."""
     for outcome in work.clean(unit, sink, observer.judged):
         yield UnitResult(unit, outcome, before=False)
+
+
+def _is_stored(source: Source, sink: CleanSink) -> bool:
+    """Whether scans are read from an object store, or written to one."""
+    return sink.destination.is_stored or any(isinstance(each, StoredFrame) for each in source)
 
 
 def _counted(
@@ -180,4 +195,4 @@ def _job(source: Source, work: UnitCleaning, sink: CleanSink, division: Division
         "most_removed": work.most_removed,
         "weather": "every scan" if work.measured is None else "some scans",
     }
-    return Job.begin(sink.folder, options, division.shard, division.anew)
+    return Job.begin(sink.destination.folder, options, division.shard, division.anew)

@@ -15,6 +15,7 @@ from derain.files.reading import file_size, read_bytes, reading, stamp_of
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.records import Records
+from derain.stores.url import url_of
 
 # Bytes at either end of a file that identify it; no two scans begin and end alike.
 ENDS = 2**16
@@ -36,8 +37,8 @@ class FileFrame(Frame):
 
     @property
     def name(self) -> str:
-        """What messages call it: its path."""
-        return str(self.path)
+        """What messages call it: its path, or the URL that it stands for."""
+        return url_of(self.path)
 
     @property
     def suffix(self) -> str:

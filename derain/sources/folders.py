@@ -2,7 +2,7 @@
 
 import os
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from glob import escape, glob
 from itertools import islice
@@ -23,10 +23,14 @@ from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame, MemoryFrame
 from derain.sources.records import Records
 from derain.sources.source import Frames, Source
+from derain.stores.url import is_url
 from derain.system.notices import warn_once
 
 # Scans may be written as text, but beside folders of scans a text is a note or a record.
 TEXTS = (".csv", ".txt")
+
+# Gives the clouds of a bag, or a path into one, with or without labels, by its name or not.
+FramesOfBag = Callable[[Path, bool, bool], Sequence[Frame]]
 
 # What a program gives: one of them, or several of one kind or another.
 GivenScans = Source | Scan | Frame | str | Path | Iterable[Scan | Frame | str | Path]
@@ -67,6 +71,27 @@ def named_frames(
             read.
     """
     given = [paths] if isinstance(paths, str | Path) else paths
+    return frames_named(given, columns, labelled, layouts, recordings, _clouds_of_bag)
+
+
+def frames_named(
+    given: Iterable[str | Path],
+    columns: Sequence[str],
+    labelled: bool,
+    layouts: Sequence[Layout] | None,
+    recordings: bool,
+    frames_of_bag: FramesOfBag,
+) -> Frames:
+    """The same as :func:`named_frames`, with bags in another way.
+
+    Args:
+        given: The paths.
+        columns: As there.
+        labelled: As there.
+        layouts: As there.
+        recordings: As there.
+        frames_of_bag: Gives the frames of each bag.
+    """
     named = [or_example(Path(path)) for path in given]
     found = [_scans_or_bags(path, layouts) for path in named]
     scans = [scan for of_path, _ in found for scan in of_path]
@@ -79,7 +104,8 @@ def named_frames(
     frames: list[Frame] = []
     for of_path, bags in found:
         frames += islice(files, len(of_path))
-        frames += _frames_of_bags(bags, labelled, several)
+        for bag in bags:
+            frames += frames_of_bag(bag, labelled, several)
     return Frames(frames)
 
 
@@ -87,7 +113,8 @@ def source_of(scans: GivenScans, columns: Sequence[str] = DEFAULT_COLUMNS) -> So
     """The source that a program means, with the labels that its scans have.
 
     Args:
-        scans: A source; or one or more scans in memory, frames, files and folders of scans.
+        scans: A source; or one or more scans in memory, frames, files and folders of scans, or URLs
+            of files and folders.
         columns: Names of the columns of files that do not name them.
 
     Raises:
@@ -105,6 +132,10 @@ def source_of(scans: GivenScans, columns: Sequence[str] = DEFAULT_COLUMNS) -> So
                 frames.append(item)
             case Scan():
                 frames.append(MemoryFrame(key=f"{place:06d}", number=place, scan=item))
+            case str() if is_url(item):
+                from derain.sources.store_listing import frames_at
+
+                frames += frames_at([item], columns)
             case str() | Path():
                 frames += named_frames(item, columns, labelled=True)
             case _:
@@ -262,12 +293,11 @@ def _several_folders(scans: Iterable[Path]) -> bool:
     return len({scan.parent for scan in scans}) > 1
 
 
-def _frames_of_bags(bags: Sequence[Path], labelled: bool, by_name: bool) -> Iterator[Frame]:
-    for bag in bags:
-        # What reads bags is imported only where there are some.
-        from derain.sources.bag_frame import bag_frames
+def _clouds_of_bag(bag: Path, labelled: bool, by_name: bool) -> Sequence[Frame]:
+    # What reads bags is imported only where there are some.
+    from derain.sources.bag_frame import bag_frames
 
-        yield from bag_frames(bag, labelled, by_name)
+    return bag_frames(bag, labelled, by_name)
 
 
 def _holds_scans(folder: Path) -> bool:

@@ -16,6 +16,7 @@ from derain.files.names import beside
 from derain.scan import Scan
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
+from derain.stores.url import url_of
 
 
 class FolderSink:
@@ -79,7 +80,7 @@ class FolderSink:
                 raise InputError(
                     frame.name,
                     f"another scan has the same name: what is made of it and of {other.name} would "
-                    f"both be {target}",
+                    f"both be {url_of(target)}",
                     f"Take them in two runs, each to its {self.option}.",
                 )
 
@@ -107,17 +108,19 @@ class FolderSink:
     def _refuse_own_files(self, frame: FileFrame) -> None:
         remedy = f"Give {self.option} another folder."
         if _is_same(self.scan_path(frame), frame.path):
-            raise InputError(self.folder, f"would overwrite {frame.path}", remedy)
+            raise InputError(url_of(self.folder), f"would overwrite {frame.name}", remedy)
         removed = self.removed_path(frame)
         if removed is not None and _is_same(removed, frame.path):
             raise InputError(
-                removed.parent, f"would overwrite {frame.path}", "Give --removed another folder."
+                url_of(removed.parent),
+                f"would overwrite {frame.name}",
+                "Give --removed another folder.",
             )
         # Results that lie where labels are looked for would be taken for the truth.
         target = self.path(frame, LABEL)
         places = (frame.label_path, beside(frame.path, LABEL), *label_places(frame.path))
         if any(labels is not None and _is_same(labels, target) for labels in places):
-            raise InputError(self.folder, f"holds the labels of {frame.path}", remedy)
+            raise InputError(url_of(self.folder), f"holds the labels of {frame.name}", remedy)
 
 
 class LabelSink(FolderSink):

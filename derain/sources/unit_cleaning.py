@@ -1,20 +1,24 @@
 """Cleans the scans of one unit: judges them, measures their weather, and writes them."""
 
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from derain.errors import InputError
 from derain.files.reading import reading
-from derain.sources.clean_sink import CleanSink
+from derain.sources.clean_sink import CleanSink, Destination
 from derain.sources.cleaned_scan import CleanedScan, ScanOutcome, unpacked
+from derain.sources.fetched_unit import fetched
 from derain.sources.frame import Frame, time_of
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
-from derain.sources.source import Frames, Source
+from derain.sources.source import Frames
+from derain.sources.spread import evenly_spaced
+from derain.sources.stored_frame import StoredBag
 from derain.sources.unit_judging import UnitJudging
 from derain.sources.units import FrameUnit
+from derain.sources.weather_monitor import SAMPLED_SCANS
 from derain.system.stopwatch import Stopwatch
 from derain.views.scan_issues import (
     HEAVIEST_RAIN,
@@ -33,19 +37,30 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
     """Cleans the scans of one unit after the other.
 
     Attributes:
-        sink_for: Makes the sink of a unit.
+        destination: Where they are written, and what is written of them.
         most_removed: Scans with a greater share of rain in their valid points are not written.
         measured: Keys of the scans whose weather is measured; None measures all.
     """
 
-    sink_for: Callable[[Source], CleanSink]
+    destination: Destination
     most_removed: float
     measured: Collection[str] | None
 
     def do(self, unit: FrameUnit) -> Iterator[ScanOutcome]:
         """Cleans the scans of a unit."""
-        with self.sink_for(Frames(unit.frames)) as sink:
-            yield from self.clean(unit, sink)
+        held: list[ScanOutcome] = []
+        with (
+            fetched(unit) as (here, with_urls),
+            self.destination.opened(Frames(here.frames)) as sink,
+        ):
+            for outcome in self._measuring(unit, here).clean(here, sink):
+                if outcome.error is not None:
+                    outcome = replace(outcome, error=with_urls(outcome.error))
+                if self.destination.is_stored:  # what is not uploaded yet is not done
+                    held.append(outcome)
+                else:
+                    yield outcome
+        yield from held
 
     def clean(
         self, unit: FrameUnit, sink: CleanSink, on_judgement: OnJudgement = lambda judgement: None
@@ -75,7 +90,7 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
 
     def is_there(self, unit: FrameUnit) -> bool:
         """Whether all files and bags of the unit are there."""
-        return all(path.exists() for path in self.sink_for(Frames(unit.frames)).targets())
+        return self.destination.holds(Frames(unit.frames))
 
     def failed(self, unit: FrameUnit, error: InputError) -> Iterator[ScanOutcome]:
         """The outcome of a unit that failed as a whole, which is that of its first scan."""
@@ -93,13 +108,26 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
         """The outcome that a record has."""
         figures = dict(written)
         key, seconds, measured = (figures.pop(name) for name in ("key", "seconds", "measured"))
+        cleaned = CleanedScan(**figures)
         return ScanOutcome(
-            next(frame for frame in unit.frames if frame.key == key),
+            _frame(unit, key, cleaned.scan, seconds),
             [],
-            CleanedScan(**figures),
+            cleaned,
             seconds,
             None if measured is None else unpacked(measured),
         )
+
+    def _measuring(self, unit: FrameUnit, here: FrameUnit) -> "UnitCleaning":
+        """The same where some clouds of a bag are measured, which are not known before now.
+
+        Args:
+            unit: The unit.
+            here: The same with frames of this machine.
+        """
+        if self.measured is None or not isinstance(unit.frames[0], StoredBag):
+            return self
+        sample = evenly_spaced(here.frames, SAMPLED_SCANS)
+        return replace(self, measured=frozenset(frame.key for frame in sample))
 
     def _cleaned(
         self, frame: Frame, judgement: Judgement, stopwatch: Stopwatch, sink: CleanSink
@@ -132,6 +160,14 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
             warnings=[issue.detail for issue in issues],
         )
         return ScanOutcome(frame, issues, figures, time_of(frame), measured)
+
+
+def _frame(unit: FrameUnit, key: str, name: str, seconds: float | None) -> Frame:
+    """The frame of a unit that has a key, or the cloud of its bag."""
+    first = unit.frames[0]
+    if isinstance(first, StoredBag):
+        return first.cloud(key, name, seconds)
+    return next(frame for frame in unit.frames if frame.key == key)
 
 
 def _issues(method: Method, judgement: Judgement, most_removed: float) -> list[ScanIssue]:

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
-from pathlib import Path
 from typing import Self
 
 from derain.errors import InputError
@@ -14,6 +13,8 @@ from derain.sources.bag_frame import BagFrame
 from derain.sources.frame import Frame
 from derain.sources.method import Method
 from derain.sources.recordings import recordings_of
+from derain.sources.stored_frame import StoredBag
+from derain.stores.url import Place
 from derain.views.window import Window
 
 # Scans of a block: a few seconds of a drive, beside which the scans around a block that are read
@@ -37,7 +38,7 @@ class Division:
     resume: bool = False
     anew: bool = False
 
-    def keeps_records(self, source: Sequence[Frame], folder: Path) -> bool:
+    def keeps_records(self, source: Sequence[Frame], folder: Place) -> bool:
         """Whether there is a record of each unit: it is asked for, or begun, or takes long.
 
         Args:
@@ -105,7 +106,9 @@ def spans_of(source: Sequence[Frame], method: Method, block: int) -> list[Span]:
 
 
 def _spans_of(recording: Sequence[Frame], method: Method, block: int) -> Iterator[Span]:
-    window = None if isinstance(recording[0], BagFrame) else method.depends_on(recording)
+    window = (
+        None if isinstance(recording[0], BagFrame | StoredBag) else method.depends_on(recording)
+    )
     if window is None:
         window, block = Window(), len(recording)
     for begin in range(0, len(recording), block):

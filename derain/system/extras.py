@@ -86,11 +86,12 @@ LZ4 = Extra("ros", "lz4")
 ZSTANDARD = Extra("ros", "zstandard")
 RERUN = Extra("view", "rerun")
 DISTRIBUTED = Extra("cluster", "distributed")
+FSSPEC = Extra("remote", "fsspec")
 
 EXTRAS = (
     *(TORCH, LIGHTNING, TORCHMETRICS, JSONARGPARSE, TENSORBOARD, MATPLOTLIB),
     *(ONNX, ONNXSCRIPT, OPTUNA, OPEN3D, PYARROW, FLATBUFFERS, LASPY),
-    *(OPENVINO, ROSBAGS, MCAP, RERUN, DISTRIBUTED),
+    *(OPENVINO, ROSBAGS, MCAP, RERUN, DISTRIBUTED, FSSPEC),
 )
 
 # What is needed to read a checkpoint, to make an ONNX file of it, and to train it.

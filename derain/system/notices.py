@@ -2,7 +2,7 @@
 
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from typing import Protocol
@@ -62,6 +62,8 @@ def warn(text: str) -> None:
     Args:
         text: The warning.
     """
+    for change in reversed(_changes):
+        text = change(text)
     for record in _records:
         record.append(text)
     # Not print: a progress bar may be in the line.
@@ -81,6 +83,20 @@ def recorded_warnings() -> Iterator[list[str]]:
         yield record
     finally:
         _records.pop()
+
+
+# Of the blocks of `changed_warnings` that run, the innermost last.
+_changes: list[Callable[[str], str]] = []
+
+
+@contextmanager
+def changed_warnings(change: Callable[[str], str]) -> Iterator[None]:
+    """Changes the text of each warning of :func:`warn` in the block, such as what names a file."""
+    _changes.append(change)
+    try:
+        yield
+    finally:
+        _changes.pop()
 
 
 @cache

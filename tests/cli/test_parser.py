@@ -12,6 +12,7 @@ from derain.cli.options import column_names
 from derain.cli.parser import Parser
 from derain.errors import InputError
 from derain.export.storage import Storage
+from derain.stores.url import place_of
 
 
 def parser_of(command: str) -> Parser:
@@ -21,7 +22,7 @@ def parser_of(command: str) -> Parser:
 
 
 # What these types refuse is known when the command runs, if at all.
-TAKEN_AS_THEY_ARE = (None, Path, Storage, column_names)
+TAKEN_AS_THEY_ARE = (None, Path, place_of, Storage, column_names)
 
 
 def checked_options() -> Iterator[Any]:

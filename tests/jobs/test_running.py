@@ -84,7 +84,7 @@ def test_other_options_are_refused_and_named(out: Path) -> None:
     with pytest.raises(InputError, match="colour was not there and is red"):
         begun(out, colour="red")
     anew = Job.begin(out, {**OPTIONS, "size": 4}, None, anew=True)
-    assert anew.record_of(UNITS[0]) is None
+    assert next(anew.records_of(UNITS)) == (UNITS[0], None)
 
 
 def test_a_unit_that_kills_its_process_is_passed_over_after_three_tries(out: Path) -> None:

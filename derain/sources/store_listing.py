@@ -1,0 +1,139 @@
+"""Lists the scans and bags at URLs, by the rules for folders of this machine.
+
+The objects are listed once. Empty files at the same paths in a temporary folder then show what
+layout they have; only what lies beside the scans is fetched: times, poses, metadata of bags.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import TypeVar
+
+from derain.bags.names import BAG_METADATA, split, stem, within
+from derain.errors import InputError
+from derain.files import DEFAULT_COLUMNS, RECORDS
+from derain.sources.file_frame import FileFrame
+from derain.sources.folders import frames_named, named_frames
+from derain.sources.frame import Frame
+from derain.sources.source import Frames
+from derain.sources.stored_frame import StoredBag, StoredScan
+from derain.stores.mirror import Mirror, mirror
+from derain.stores.objects import StoredObject, listed
+from derain.stores.url import Place, is_url, without_secrets
+from derain.system.notices import changed_warnings
+
+# What is read to list scans and bags, or for the times and poses of scans.
+READ_WHEN_LISTED = (*RECORDS, BAG_METADATA)
+
+Value = TypeVar("Value")
+
+
+def frames_at(
+    places: Iterable[Place], columns: Sequence[str] = DEFAULT_COLUMNS, topic: str | None = None
+) -> Frames:
+    """The scans at paths or URLs; those at URLs are without labels.
+
+    Args:
+        places: As :func:`~derain.sources.folders.named_frames` takes them, all of them paths or all
+            of them URLs.
+        columns: Names of the columns of files that do not name them.
+        topic: Topic of the bags among them; None where they have only one of clouds.
+
+    Raises:
+        InputError: As :func:`~derain.sources.folders.named_frames` raises it; a store that cannot
+            be reached.
+    """
+    places = list(places)
+    urls = [str(place) for place in places if is_url(place)]
+    if not urls:
+        return named_frames(within(map(Path, places), topic), columns)
+    if len(urls) < len(places):
+        other = next(place for place in places if not is_url(place))
+        raise InputError(
+            without_secrets(urls[0]),
+            f"is in a store, and {other} is not",
+            "Clean them by two commands.",
+        )
+    with mirror() as lent, changed_warnings(lent.with_urls):
+        listing = _Listing(lent, (stored for url in urls for stored in listed(url)))
+        paths = within([lent.path_of(url) for url in urls], topic)
+        return listing.stored(frames_named(paths, columns, False, None, False, listing.bag))
+
+
+class _Listing:
+    """Objects of stores, and a mirror that shows which there are.
+
+    Args:
+        lent: An empty mirror.
+        objects: The objects; hidden ones, as the records of a job are, are passed over.
+    """
+
+    def __init__(self, lent: Mirror, objects: Iterable[StoredObject]) -> None:
+        self._lent = lent
+        self._root = lent.root
+        self._stamps: dict[Path, str] = {}
+        found = ((stored.path, stored) for stored in objects)
+        self._objects = {path: stored for path, stored in found if not _is_hidden(path)}
+        read = {path for path in self._objects if path.name in READ_WHEN_LISTED}
+        lent.mark(path for path in self._objects if path not in read)
+        lent.fetch(self._objects[path] for path in read)
+
+    def bag(self, path: Path, labelled: bool, by_name: bool) -> list[Frame]:
+        """The bag that a path of the mirror leads into, as one frame."""
+        found = split(path)
+        assert found is not None
+        bag, inner = found[0].relative_to(self._root), found[1]
+        files = [bag] if bag in self._objects else [*self._inside(bag)]
+        return [
+            StoredBag(
+                key=stem(bag),
+                sequence=stem(bag),
+                path=bag,
+                objects=tuple(self._objects[file] for file in files),
+                inner=inner,
+                by_name=by_name,
+            )
+        ]
+
+    def stored(self, frames: Iterable[Frame]) -> Frames:
+        """Frames of the mirror as frames of their stores, for which the mirror is not needed."""
+        return Frames(map(self._of_store, frames))
+
+    def _of_store(self, frame: Frame) -> Frame:
+        if isinstance(frame, StoredBag):
+            return frame
+        assert isinstance(frame, FileFrame)
+        path = frame.path.relative_to(self._root)
+        return StoredScan(
+            key=frame.key,
+            sequence=frame.sequence,
+            number=frame.number,
+            path=path,
+            columns=frame.columns,
+            objects=(self._objects[path],),
+            recorded=(self._recorded(lambda: frame.time), self._recorded(lambda: frame.pose)),
+            records_stamp=self._stamp(path.parent),
+        )
+
+    def _inside(self, folder: Path) -> Iterator[Path]:
+        """The objects directly in a folder."""
+        inside = sorted((self._root / folder).iterdir())
+        yield from (file.relative_to(self._root) for file in inside if file.is_file())
+
+    def _stamp(self, folder: Path) -> str:
+        """Sizes and versions of the records of the scans in a folder."""
+        if folder not in self._stamps:
+            places = (place / name for place in (folder, folder.parent) for name in RECORDS)
+            there = (self._objects[place] for place in places if place in self._objects)
+            self._stamps[folder] = " ".join(f"{each.size}-{each.version}" for each in there)
+        return self._stamps[folder]
+
+    def _recorded(self, value: Callable[[], Value]) -> Value | InputError:
+        """What a record has, or the error of a damaged one."""
+        try:
+            return value()
+        except InputError as error:
+            return self._lent.error_with_urls(error)
+
+
+def _is_hidden(path: Path) -> bool:
+    return any(part.startswith(".") for part in path.parts)

@@ -1,0 +1,193 @@
+"""Scans and bags in object stores as frames, which are fetched to be read."""
+
+from abc import abstractmethod
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Self, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.bags.names import ROS1_SUFFIX, stem
+from derain.errors import InputError
+from derain.scan import Scan
+from derain.sources.file_frame import FileFrame
+from derain.stores.mirror import Mirror, mirror
+from derain.stores.objects import StoredObject
+from derain.stores.url import path_of
+
+Value = TypeVar("Value")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StoredFrame(FileFrame):
+    """What lies in an object store; its path only names it.
+
+    Attributes:
+        objects: What is to be fetched.
+    """
+
+    objects: tuple[StoredObject, ...]
+
+    @abstractmethod
+    def fetched(self, where: Mirror) -> list[FileFrame]:
+        """The frames that it stands for, of which all is on this machine.
+
+        Args:
+            where: Where its objects are.
+
+        Raises:
+            InputError: A bag that cannot be read.
+        """
+
+    def size(self) -> int:
+        """Bytes of its objects, as far as their store lists them."""
+        return sum(stored.size or 0 for stored in self.objects)
+
+    def stamp(self) -> str:
+        """Sizes and versions of its objects."""
+        return " ".join(f"{stored.size}-{stored.version}" for stored in self.objects)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StoredScan(StoredFrame):
+    """A scan in an object store. Each time it is read, it is fetched.
+
+    Attributes:
+        recorded: When it was taken, and its pose, as the records beside it have them: the value, or
+            the error of a damaged record.
+        records_stamp: Changes when these records do.
+        file: Where it is on this machine while it is fetched.
+    """
+
+    recorded: tuple[
+        float | InputError | None,
+        NDArray[np.float64] | InputError | None,
+    ] = (None, None)
+    records_stamp: str = ""
+    file: Path | None = None
+
+    @property
+    def time(self) -> float | None:
+        """When it was taken, seconds."""
+        return _value(self.recorded[0])
+
+    @property
+    def pose(self) -> NDArray[np.float64] | None:
+        """Sensor to world, float64 (4, 4), as it was given, or else of its records."""
+        return _value(self.recorded[1]) if self.sensor_to_world is None else self.sensor_to_world
+
+    def read(self) -> Scan:
+        """Reads the scan, without labels."""
+        with self._fetched() as scan:
+            return replace(scan.read(), name=self.name)
+
+    def count_points(self) -> int:
+        """Number of points of the scan."""
+        with self._fetched() as scan:
+            return scan.count_points()
+
+    def fingerprint(self) -> str:
+        """A fingerprint of the content of its file, 16 hexadecimal digits."""
+        with self._fetched() as scan:
+            return scan.fingerprint()
+
+    def checksums(self) -> tuple[str, str | None]:
+        """SHA-256 of its file, in hexadecimal digits."""
+        with self._fetched() as scan:
+            return scan.checksums()
+
+    def stamp(self) -> str:
+        """Size and version of its object, and of the records beside it."""
+        return f"{super().stamp()} {self.records_stamp}"
+
+    def fetched(self, where: Mirror) -> list[FileFrame]:
+        """The scan in its file on this machine."""
+        return [replace(self, file=where.root / self.path)]
+
+    @contextmanager
+    def _fetched(self) -> Iterator[FileFrame]:
+        """Lends the frame of its file on this machine."""
+        if self.file is not None:
+            yield self._at(self.file)
+            return
+        with mirror() as where:
+            where.fetch(self.objects)
+            yield self._at(where.root / self.path)
+
+    def _at(self, file: Path) -> FileFrame:
+        return FileFrame(
+            key=self.key, path=file, columns=self.columns, intensity_scale=self.intensity_scale
+        )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StoredBag(StoredFrame):
+    """All clouds of a topic of a bag in an object store, which are not known before it is fetched.
+
+    Attributes:
+        inner: The topic, as a part of a path; empty where the bag has only one of clouds.
+        by_name: Whether keys of clouds begin with the stem of the bag.
+        seconds: When the cloud was taken that it stands for; None where it stands for all.
+    """
+
+    inner: str = ""
+    by_name: bool = False
+    seconds: float | None = None
+
+    @property
+    def suffix(self) -> str:
+        """Empty: there is no file whose format an output could keep."""
+        return ""
+
+    @property
+    def written_name(self) -> str:
+        """Name of its copy: of ROS 1 a file, of ROS 2 a folder."""
+        return self.path.name if self.path.suffix.lower() == ROS1_SUFFIX else stem(self.path)
+
+    @property
+    def time(self) -> float | None:
+        """When the cloud was taken, seconds."""
+        return self.seconds
+
+    def fetched(self, where: Mirror) -> list[FileFrame]:
+        """Its clouds."""
+        from derain.sources.bag_frame import bag_frames
+
+        clouds = bag_frames(where.root / self.path / self.inner, by_name=self.by_name)
+        return [
+            replace(
+                cloud,
+                path=cloud.path.relative_to(where.root),
+                intensity_scale=self.intensity_scale,
+                sensor_to_world=self.sensor_to_world,
+            )
+            for cloud in clouds
+        ]
+
+    def cloud(self, key: str, name: str, seconds: float | None) -> Self:
+        """One of its clouds, of which only that is known.
+
+        Args:
+            key: Its key.
+            name: What messages call it.
+            seconds: When it was taken, seconds; None where that is not known.
+        """
+        return replace(self, key=key, path=path_of(name), seconds=seconds)
+
+    def read(self) -> Scan:
+        """Refuses: it has several clouds."""
+        raise InputError(self.name, "is a bag, and no single scan", "Clean it by `derain run`.")
+
+
+def _value(recorded: Value | InputError) -> Value:
+    """What a record has.
+
+    Raises:
+        InputError: It is damaged.
+    """
+    if isinstance(recorded, InputError):
+        raise recorded
+    return recorded

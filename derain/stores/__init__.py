@@ -1,0 +1,1 @@
+"""Object stores by URL: listed, copied from and to, and small documents in them."""

@@ -1,0 +1,176 @@
+"""Small documents of JSON in a folder, of this machine or of a store; each is written whole."""
+
+import json
+import os
+import shutil
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from pathlib import Path
+
+from derain.files.atomic import replacing, temporary_folder, writing
+from derain.stores.objects import AT_ONCE, opened_folder, tried
+from derain.stores.url import Place, is_url
+
+# Documents of a store that are read before the first of them is needed.
+READ_AT_ONCE = 20 * AT_ONCE
+
+
+class Documents(ABC):
+    """Documents by their names, which are relative paths."""
+
+    @abstractmethod
+    def read(self, name: str) -> bytes | None:
+        """The content of a document; None where it is not there.
+
+        Raises:
+            InputError: The store cannot be reached.
+        """
+
+    @abstractmethod
+    def read_each(self, names: Sequence[str]) -> Iterator[bytes | None]:
+        """The contents of many, one after the other; see :meth:`read`."""
+
+    @abstractmethod
+    def write(self, name: str, text: str) -> None:
+        """Writes a document whole, over one that is there.
+
+        Raises:
+            InputError: It cannot be written.
+        """
+
+    @abstractmethod
+    def create(self, name: str, text: str) -> None:
+        """Writes a document unless it is there; which one is there, only reading it shows.
+
+        Raises:
+            InputError: It cannot be written.
+        """
+
+    @abstractmethod
+    def remove_all(self) -> None:
+        """Removes all documents.
+
+        Raises:
+            InputError: The store cannot be reached.
+        """
+
+
+def documents_at(folder: Place, name: str) -> Documents:
+    """The documents in a folder of a place.
+
+    Args:
+        folder: The place.
+        name: Name of the folder in it.
+    """
+    if is_url(folder):
+        return ObjectDocuments(f"{str(folder).rstrip('/')}/{name}")
+    return FileDocuments(Path(folder, name))
+
+
+class FileDocuments(Documents):
+    """Documents in a folder of this machine, or of a file system that several share.
+
+    Args:
+        folder: The folder, made when the first is written.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def read(self, name: str) -> bytes | None:
+        """The content of a document; None where it is not there, or cannot be read."""
+        with suppress(OSError):
+            return (self._folder / name).read_bytes()
+        return None
+
+    def read_each(self, names: Sequence[str]) -> Iterator[bytes | None]:
+        """The contents of many, each read when it is asked for."""
+        yield from map(self.read, names)
+
+    def write(self, name: str, text: str) -> None:
+        """Writes a document whole."""
+        with replacing(self._folder / name) as temporary:
+            temporary.write_text(text, "utf-8")
+
+    def create(self, name: str, text: str) -> None:
+        """Writes a document unless it is there."""
+        path = self._folder / name
+        if path.exists():
+            return
+        with writing(path), temporary_folder(path.parent) as temporary:
+            written = temporary / path.name
+            written.write_text(text, "utf-8")
+            try:
+                os.link(written, path)  # unlike os.replace, it fails where another was quicker
+            except FileExistsError:
+                return
+            except OSError:  # a file system without links
+                os.replace(written, path)
+
+    def remove_all(self) -> None:
+        """Removes the folder."""
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+
+class ObjectDocuments(Documents):
+    """Documents in a folder of an object store.
+
+    Args:
+        url: URL of the folder.
+    """
+
+    def __init__(self, url: str) -> None:
+        self._url = url
+
+    def read(self, name: str) -> bytes | None:
+        """The content of a document; None where it is not there."""
+        filesystem, folder = opened_folder(self._url)
+
+        def content() -> bytes | None:
+            try:
+                read: bytes = filesystem.cat_file(f"{folder}/{name}")
+            except FileNotFoundError:
+                return None
+            json.loads(read)  # a read that breaks off shows here, and is tried again
+            return read
+
+        return tried(f"{self._url}/{name}", content)
+
+    def read_each(self, names: Sequence[str]) -> Iterator[bytes | None]:
+        """The contents of many, some read at once; one listing shows which are there."""
+        filesystem, folder = opened_folder(self._url)
+        keys = tried(self._url, lambda: filesystem.find(folder))
+        there = {key[len(folder) + 1 :] for key in keys}
+        with ThreadPoolExecutor(AT_ONCE) as pool:
+            for begin in range(0, len(names), READ_AT_ONCE):
+                some = names[begin : begin + READ_AT_ONCE]
+                yield from pool.map(lambda name: self.read(name) if name in there else None, some)
+
+    def write(self, name: str, text: str) -> None:
+        """Writes a document whole."""
+        filesystem, folder = opened_folder(self._url)
+        content = text.encode()
+        tried(f"{self._url}/{name}", lambda: filesystem.pipe_file(f"{folder}/{name}", content))
+
+    def create(self, name: str, text: str) -> None:
+        """Writes a document unless it is there."""
+        if self.read(name) is not None:
+            return
+        filesystem, folder = opened_folder(self._url)
+        try:
+            filesystem.pipe_file(f"{folder}/{name}", text.encode(), mode="create")
+        except Exception:  # it is there by now, the request failed, or the store has no such mode
+            if self.read(name) is None:
+                self.write(name, text)
+
+    def remove_all(self) -> None:
+        """Removes all documents."""
+        filesystem, folder = opened_folder(self._url)
+
+        def remove() -> None:
+            with suppress(FileNotFoundError):
+                filesystem.rm(folder, recursive=True)
+
+        tried(self._url, remove)

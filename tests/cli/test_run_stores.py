@@ -1,0 +1,163 @@
+"""``derain run`` and ``derain status`` by URLs of an object store: the bytes of a local run."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from small_bags import small_bag
+
+from benchmarks.s3_server import BUCKET, Faults, file_system, s3_server
+from derain.evaluation.hard_cases import scene
+
+FAULTS = Faults()
+OPTIONS = ("--block", 2, "--most-removed", 1)
+SCANS = 5
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[None]:
+    with s3_server(FAULTS):
+        yield
+
+
+@pytest.fixture
+def s3(server: None, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+    """The file system of a server that is empty, and works unless it is made to fail."""
+    monkeypatch.setattr("derain.stores.objects.WAITS", (0.01,) * 20)
+    files = file_system()
+    yield files
+    FAULTS.refuse = FAULTS.cut = 0
+    for name in files.ls(BUCKET):
+        files.rm(name, recursive=True)
+
+
+@pytest.fixture
+def drive(tmp_path: Path) -> Path:
+    """A recording with poses."""
+    folder = tmp_path / "drive"
+    folder.mkdir()
+    for number in range(SCANS):
+        points = scene(200, seed=7)
+        points[:, 0] -= 0.3 * number
+        points[:20, :3] = np.random.default_rng(number).uniform(-6, 6, (20, 3))
+        points.tofile(folder / f"{number:06d}.bin")
+    poses = (f"1 0 0 {0.3 * number} 0 1 0 0 0 0 1 0" for number in range(SCANS))
+    (folder / "poses.txt").write_text("\n".join(poses))
+    return folder
+
+
+def in_folder(folder: Path) -> dict[str, bytes]:
+    """The results in a folder by their paths."""
+    files = [file for file in folder.rglob("*") if file.is_file() and ".derain" not in file.parts]
+    return {file.relative_to(folder).as_posix(): file.read_bytes() for file in files}
+
+
+def in_store(s3: Any, folder: str) -> dict[str, bytes]:
+    """The results in a folder of the store by their paths."""
+    keys = [key for key in s3.find(f"{BUCKET}/{folder}") if "/.derain/" not in key]
+    return {key.removeprefix(f"{BUCKET}/{folder}/"): s3.cat_file(key) for key in keys}
+
+
+def test_a_store_that_fails_gives_the_bytes_of_a_folder_and_a_second_run_does_nothing(
+    succeed, s3: Any, drive: Path, tmp_path: Path
+) -> None:
+    s3.put(f"{drive}/", f"{BUCKET}/drive/", recursive=True)
+    succeed("run", "persistence", drive, "--out", tmp_path / "out", *OPTIONS)
+    FAULTS.refuse, FAULTS.cut = 10, 7
+    command = ("run", "persistence", "s3://drives/drive/", "--out", "s3://drives/out", *OPTIONS)
+    first = succeed(*command)
+    again = succeed(*command)
+    FAULTS.refuse = FAULTS.cut = 0
+    assert in_store(s3, "out") == in_folder(tmp_path / "out")
+    assert len(in_store(s3, "out")) == 2 * SCANS
+    assert first.out.startswith("s3://drives/drive/000000.bin: ")
+    assert f"{SCANS} scans ({SCANS} of them done before)" in again.out
+    assert "not-to-be-printed" not in first.out + first.err
+    assert "3 of 3 units done" in succeed("status", "s3://drives/out").out
+
+
+def test_a_scan_that_is_changed_in_the_store_is_done_again(succeed, s3: Any, drive: Path) -> None:
+    s3.put(f"{drive}/", f"{BUCKET}/drive/", recursive=True)
+    command = ("run", "dror", "s3://drives/drive/", "--out", "s3://drives/out", *OPTIONS)
+    succeed(*command)
+    s3.put_file(str(drive / "000003.bin"), f"{BUCKET}/drive/000002.bin")
+    again = succeed(*command)
+    assert f"{SCANS} scans ({SCANS - 2} of them done before)" in again.out
+
+
+def test_workers_read_a_store_and_write_to_a_folder(
+    succeed, s3: Any, drive: Path, tmp_path: Path
+) -> None:
+    s3.put(f"{drive}/", f"{BUCKET}/drive/", recursive=True)
+    for scans, out, workers in ((drive, "one", 1), ("s3://drives/drive", "two", 2)):
+        options = (*OPTIONS, "--workers", workers)
+        succeed("run", "persistence", scans, "--out", tmp_path / out, *options)
+    assert in_folder(tmp_path / "one") == in_folder(tmp_path / "two")
+
+
+@pytest.mark.parametrize("storage", ["mcap", "ros1"])
+def test_a_bag_of_a_store_is_cleaned_as_one_of_a_folder(
+    succeed, s3: Any, tmp_path: Path, storage: str
+) -> None:
+    (tmp_path / "bags").mkdir()
+    small_bag(tmp_path / "bags", storage)
+    s3.put(f"{tmp_path / 'bags'}/", f"{BUCKET}/bags/", recursive=True)
+    succeed("run", "dror", tmp_path / "bags", "--out", tmp_path / "out", *OPTIONS)
+    command = ("run", "dror", "s3://drives/bags", "--out", "s3://drives/out", *OPTIONS)
+    first, again = succeed(*command), succeed(*command)
+    assert in_store(s3, "out") == in_folder(tmp_path / "out")
+    assert "s3://drives/bags/drive" in first.out.splitlines()[0]
+    assert "3 scans (3 of them done before)" in again.out
+
+
+def test_what_cannot_be_read_is_listed_and_done_by_the_next_run(
+    run_derain, succeed, s3: Any, drive: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    s3.put(f"{drive}/", f"{BUCKET}/drive/", recursive=True)
+    command = ("run", "dror", "s3://drives/drive/", "--out", "s3://drives/out", *OPTIONS)
+    with monkeypatch.context() as broken:
+        broken.setattr("derain.stores.mirror.fetch", refusing("000002.bin"))
+        outcome = run_derain(*command)
+    assert outcome.code == 2
+    assert "s3://drives/drive/000002.bin" in outcome.err
+    assert f"2 of {SCANS} scans" in outcome.err
+    status = run_derain("status", "s3://drives/out").out
+    assert "2 of 3 units done, 1 failed" in status
+    assert f"({SCANS - 2} of them done before)" in succeed(*command).out
+
+
+def refusing(name: str) -> Any:
+    """What fetches objects, but for those of a name."""
+    from derain.errors import InputError
+    from derain.stores.objects import fetch
+
+    def fetch_others(objects: Any) -> None:
+        for stored in objects.values():
+            if stored.path.name == name:
+                raise InputError(stored.name, "a request failed", "Run it again.")
+        fetch(objects)
+
+    return fetch_others
+
+
+@pytest.mark.parametrize(
+    ("scans", "out", "part"),
+    [
+        ("s3://drives/nothing", "out", "s3://drives/nothing"),
+        ("s3://drives/drive", "s3://drives/drive", "s3://drives/drive/000000.bin"),
+        ("s3://drives/bags", "s3://drives/bags", "s3://drives/bags/drive"),
+        ("s3://drives/drive", "https://me:secret@host/out?key=secret", "https://host/out"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_in_one_line(
+    refused, s3: Any, drive: Path, tmp_path: Path, scans: str, out: str, part: str
+) -> None:
+    small_bag(tmp_path / "bags", "mcap")
+    s3.put(f"{drive}/", f"{BUCKET}/drive/", recursive=True)
+    s3.put(f"{tmp_path / 'bags'}/", f"{BUCKET}/bags/", recursive=True)
+    place = out if "://" in out else tmp_path / out
+    line = refused("run", "dror", scans, "--out", place)
+    assert part in line
+    assert "secret" not in line
