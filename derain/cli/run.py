@@ -258,6 +258,8 @@ class _Printer(CleaningObserver):
     def summarise(self, report: CleanReport) -> None:
         """Prints what was done to all scans together."""
         self._notices.warn_of_repeats()
+        if not report.scans and not report.not_cleaned:
+            print_lines("no scans in this shard", self._stream)
         if len(report.scans) > 1:
             print(report, file=self._stream, flush=True)
         if self._example.rain:
@@ -279,8 +281,8 @@ class _Printer(CleaningObserver):
     def found(self, outcome: ScanOutcome) -> None:
         """Adds a row to the table."""
         scan = outcome.figures
-        if scan.weather is not None and outcome.measured is not None:
-            row = weather_row(scan.weather, outcome.measured)
+        if scan.weather is not None and (measured := outcome.measured) is not None:
+            row = weather_row(scan.weather, measured)
             self._rows.append([scan.scan, outcome.seconds, *row])
 
     def failed(self, error: InputError) -> None:

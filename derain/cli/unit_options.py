@@ -100,8 +100,8 @@ def division_of(arguments: argparse.Namespace) -> Division:
         raise InputError(
             "--anew", "excludes shards of the work", "Give --out another folder instead."
         )
-    resume = arguments.resume or arguments.workers is not None or arguments.dask is not None
-    return Division(arguments.block, of_shard, resume, arguments.anew)
+    keep = arguments.resume or arguments.workers is not None or arguments.dask is not None
+    return Division(arguments.block, of_shard, keep, arguments.anew)
 
 
 def workers_of(arguments: argparse.Namespace, count_units: Callable[[], int]) -> int:

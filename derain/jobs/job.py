@@ -76,20 +76,23 @@ class Job:
         """The job of a folder.
 
         Raises:
-            InputError: There is none.
+            InputError: There is none, or its options are damaged.
         """
+        content = documents_at(folder, FOLDER).read(JOB)
+        named = without_secrets(str(folder))
+        if content is None:
+            raise InputError(
+                named,
+                "holds no records of a job",
+                "Name the folder that --out named, of a run over several recordings.",
+            )
         try:
-            read = _parsed(documents_at(folder, FOLDER).read(JOB))
+            read = json.loads(content)
             shards = read["shards"]
             return cls(folder, dict(read["options"]), None if shards is None else tuple(shards))
         except (ValueError, KeyError, TypeError) as error:
-            if isinstance(error, InputError):  # the store cannot be reached
-                raise
-            raise InputError(
-                without_secrets(str(folder)),
-                "holds no records of a job",
-                "Name the folder that --out named, of a run over several recordings.",
-            ) from error
+            reason = f"the options that it was begun by, {FOLDER}/{JOB}, are damaged"
+            raise InputError(named, reason, "Have everything done again by --anew.") from error
 
     @staticmethod
     def is_begun(folder: Place) -> bool:
@@ -120,9 +123,22 @@ class Job:
         return units if shard is None else shard.within(self.shards).of(units)
 
     def listed(self) -> list[Unit]:
-        """The units of the last command that went on with it."""
-        listed = _parsed(self._documents.read(UNITS)) or []
-        return [Unit(id=id_, size=size, inputs=inputs) for id_, size, inputs in listed]
+        """The units of the last command that went on with it.
+
+        Raises:
+            InputError: It was stopped before it listed them, or the list is damaged.
+        """
+        try:
+            listed = _parsed(self._documents.read(UNITS))
+            return [Unit(id=id_, size=size, inputs=inputs) for id_, size, inputs in listed]
+        except (TypeError, ValueError) as error:
+            if isinstance(error, InputError):  # the store cannot be reached
+                raise
+            raise InputError(
+                without_secrets(str(self.folder)),
+                "was begun, and its units are not listed",
+                "Run the command again that began it.",
+            ) from error
 
     def record(self, record: Record) -> None:
         """Writes the record of a unit, whose results are complete by now.

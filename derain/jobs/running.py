@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar, cast
 
 import derain
@@ -17,7 +18,7 @@ from derain.jobs.job import Job
 from derain.jobs.record import Record
 from derain.jobs.unit import Unit
 
-# At most so many units are handed out and not yet reported: what they return waits in memory.
+# At most so many units wait for an earlier one to be reported: their results are kept meanwhile.
 AHEAD = 1000
 
 UnitT = TypeVar("UnitT", bound=Unit)
@@ -39,7 +40,7 @@ class Submits(Protocol):
 
 
 class Work(ABC, Generic[UnitT, ResultT]):
-    """What is done of each unit. It is pickled once a job, and a process keeps the last one."""
+    """What is done of each unit. It is pickled once a job, and each thread keeps its last one."""
 
     @abstractmethod
     def do(self, unit: UnitT) -> Iterator[ResultT]:
@@ -59,7 +60,7 @@ class Work(ABC, Generic[UnitT, ResultT]):
 
     @abstractmethod
     def error_of(self, result: ResultT) -> InputError | None:
-        """Why a result is none; None where it is one."""
+        """The error of a result that failed; None of another."""
 
     @abstractmethod
     def to_json(self, result: ResultT) -> Any:
@@ -84,15 +85,23 @@ class Task(Generic[UnitT, ResultT]):
     Attributes:
         job: The job.
         work: What is done.
+        folder: The folder that relative paths begin in; None where there are none.
         version: The version of derain that began it.
     """
 
     job: Job
     work: Work[UnitT, ResultT]
+    folder: Path | None = None
     version: str = derain.__version__
 
     def check(self) -> None:
-        """Refuses another version of derain, and what the work refuses."""
+        """Refuses another folder, another version of derain, and what the work refuses."""
+        if self.folder is not None and self.folder != Path.cwd():
+            raise InputError(
+                "paths",
+                f"it runs in {Path.cwd()}, and they begin in {self.folder}",
+                "Give absolute paths.",
+            )
         if self.version != derain.__version__:
             raise InputError(
                 "worker",
@@ -111,16 +120,22 @@ class Task(Generic[UnitT, ResultT]):
 
     def do(self, unit: UnitT) -> Iterator[ResultT]:
         """Does a unit and yields its results; its record is there at the end."""
-        began, results = time.perf_counter(), []
+        seconds, results = 0.0, []
+        pending = self.work.do(unit)
         try:
-            for result in self.work.do(unit):
+            while True:
+                began = time.perf_counter()
+                result = next(pending, None)
+                seconds += time.perf_counter() - began  # and not what is done with it meanwhile
+                if result is None:
+                    break
                 results.append(result)
                 yield result
         except InputError as error:
             failed = list(self.work.failed(unit, error))
             results += failed
             yield from failed
-        self._record(unit, results, time.perf_counter() - began)
+        self._record(unit, results, seconds)
 
     def fail(self, unit: UnitT, error: InputError) -> list[ResultT]:
         """The results of a unit that failed where its process could not record it."""
@@ -264,5 +279,11 @@ def _task(pickled: bytes) -> Task[Any, Any]:
     except InputError as error:
         where = f"worker {platform.node()}: {error.subject}"
         raise UnfitWorkerError(where, error.reason, error.remedy) from error
+    except Exception as error:  # for instance a module that is not installed there
+        raise UnfitWorkerError(
+            f"worker {platform.node()}",
+            f"it cannot load the work ({type(error).__name__}: {error})",
+            "Install the same packages everywhere.",
+        ) from error
     _last.pickled, _last.task = pickled, task
     return task

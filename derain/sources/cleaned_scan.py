@@ -64,7 +64,7 @@ class ScanOutcome:
         issues: What is odd about it.
         cleaned: What was done to it; None where it could not be cleaned.
         seconds: When it was taken, seconds; None where that is not known.
-        measured: The weather that it shows; None where it was not measured.
+        packed: The weather that it shows, as text; None where it was not measured.
         error: Why it could not be cleaned; None where it was.
     """
 
@@ -72,7 +72,7 @@ class ScanOutcome:
     issues: list[ScanIssue]
     cleaned: CleanedScan | None = None
     seconds: float | None = None
-    measured: ScanWeather | None = None
+    packed: str | None = None
     error: InputError | None = None
 
     @property
@@ -80,6 +80,11 @@ class ScanOutcome:
         """What was done to a scan that was cleaned."""
         assert self.cleaned is not None
         return self.cleaned
+
+    @property
+    def measured(self) -> ScanWeather | None:
+        """The weather that it shows; None where it was not measured."""
+        return None if self.packed is None else unpacked(self.packed)
 
     def with_weather(self, weather: WeatherRecord | None) -> Self:
         """The same, whose figures have those of the weather."""
@@ -93,7 +98,7 @@ class ScanOutcome:
             **figures,
             "key": self.frame.key,
             "seconds": self.seconds,
-            "measured": None if self.measured is None else packed(self.measured),
+            "measured": self.packed,
         }
 
 

@@ -13,6 +13,7 @@ from derain.jobs.job import Job
 from derain.jobs.running import Submits, Task, UnitResult, run
 from derain.sources.clean_sink import CleanSink
 from derain.sources.cleaned_scan import CleanedScan, ScanOutcome, counts
+from derain.sources.file_frame import FileFrame
 from derain.sources.folders import GivenScans, source_of
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
@@ -121,22 +122,21 @@ def clean(
     """
     source = source_of(source)
     monitor = WeatherMonitor(weather, source)
-    measured = None if weather.every_scan else monitor.sample
+    sample = None if weather.every_scan else monitor.sample
     cleaned: list[CleanedScan] = []
     failures: list[InputError] = []
     before = 0
     with nullcontext(sink) if isinstance(sink, CleanSink) else CleanSink(sink, source) as opened:
-        work = UnitCleaning(
-            method, method.fingerprint(), opened.destination, most_removed, measured
-        )
+        work = UnitCleaning(method, method.fingerprint(), opened.destination, most_removed, sample)
         if executor is not None or _is_stored(source, opened):
-            division = replace(division or Division(), resume=True)
+            division = replace(division or Division(), keep_records=True)
         if division is not None and division.keeps_records(source, opened.destination.folder):
             job = _job(source, work, opened, division)
             units = units_of(source, method, division.block)
             job.list_units(units)
             units = job.shard_of(units, division.shard)
-            outcomes = _counted(run(Task(job, work), units, executor), opened)
+            task = Task(job, work, _folder_of_paths(source, opened))
+            outcomes = _counted(run(task, units, executor), opened)
         else:
             units = [whole(source)]
             outcomes = _at_once(units[0], work, opened, observer)
@@ -150,8 +150,8 @@ def clean(
                 failures.append(outcome.error)
                 observer.failed(outcome.error)
                 continue
-            if outcome.measured is not None:
-                record = monitor.add(outcome.frame, outcome.measured)
+            if (measured := outcome.measured) is not None:
+                record = monitor.add(outcome.frame, measured)
                 outcome = outcome.with_weather(record)
             if result.before:
                 observer.found(outcome)
@@ -161,7 +161,8 @@ def clean(
             cleaned.append(outcome.figures)
     # How many clouds the bags of a store have shows only when they are fetched.
     scans = sum(max(len(unit.frames), found[unit.id]) for unit in units)
-    return CleanReport(cleaned, failures, monitor, before, scans - len(cleaned))
+    not_cleaned = max(scans - len(cleaned), len(failures))
+    return CleanReport(cleaned, failures, monitor, before, not_cleaned)
 
 
 def _at_once(
@@ -170,6 +171,13 @@ def _at_once(
     """Cleans scan after scan, without records."""
     for outcome in work.clean(unit, sink, observer.judged):
         yield UnitResult(unit, outcome, before=False)
+
+
+def _folder_of_paths(source: Source, sink: CleanSink) -> Path | None:
+    """The folder that relative paths begin in; None where there are none."""
+    paths = [frame.path for frame in source if isinstance(frame, FileFrame)]
+    paths += [] if sink.destination.is_stored else [sink.folder]
+    return None if all(path.is_absolute() for path in paths) else Path.cwd()
 
 
 def _is_stored(source: Source, sink: CleanSink) -> bool:
@@ -193,6 +201,8 @@ def _job(source: Source, work: UnitCleaning, sink: CleanSink, division: Division
         **work.options("run", source, division.block),
         **sink.options,
         "most_removed": work.most_removed,
-        "weather": "every scan" if work.measured is None else "some scans",
+        "weather (--weather, --json, --fail-at, --dry)": (
+            "of every scan" if work.measured is None else "of some scans"
+        ),
     }
     return Job.begin(sink.destination.folder, options, division.shard, division.anew)

@@ -8,7 +8,7 @@ from typing import Any
 from derain.errors import InputError
 from derain.files.reading import reading
 from derain.sources.clean_sink import CleanSink, Destination
-from derain.sources.cleaned_scan import CleanedScan, ScanOutcome, unpacked
+from derain.sources.cleaned_scan import CleanedScan, ScanOutcome, packed
 from derain.sources.fetched_unit import fetched
 from derain.sources.frame import Frame, time_of
 from derain.sources.judgement import Judgement
@@ -114,7 +114,7 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
             [],
             cleaned,
             seconds,
-            None if measured is None else unpacked(measured),
+            measured,
         )
 
     def _measuring(self, unit: FrameUnit, here: FrameUnit) -> "UnitCleaning":
@@ -145,7 +145,7 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
             return ScanOutcome(frame, issues, error=error)
         with stopwatch.stage("weather"):
             due = self.measured is None or frame.key in self.measured
-            measured = judgement.weather if due else None
+            measured = packed(judgement.weather) if due else None
         with stopwatch.stage("write"):
             sink.write(judgement)
         valid, known = judgement.scan.valid, judgement.known

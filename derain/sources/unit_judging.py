@@ -44,8 +44,14 @@ class UnitJudging(Work[FrameUnit, ResultT]):
             )
 
     def judged(self, unit: FrameUnit) -> Iterator[Judged]:
-        """Judges the frames of a unit, and reads those around them that the method sees."""
-        own, failures = set(unit.frames), list[Judged]()
+        """Judges the frames of a unit, and reads those around them that the method sees.
+
+        Yields:
+            Each frame of the unit once, with its answer or the reason why it has none.
+        """
+        frames = (*unit.before, *unit.frames, *unit.after)
+        waiting = dict.fromkeys(unit.frames)  # those without answer, in order
+        caught: list[Judged] = []
 
         @contextmanager
         def catching(frame: Frame) -> Iterator[None]:
@@ -53,17 +59,47 @@ class UnitJudging(Work[FrameUnit, ResultT]):
                 with reading(Path(frame.name)):  # which names the file where the memory is full
                     yield
             except InputError as error:
-                if frame in own:
-                    failures.append((frame, error))
+                caught.append((frame, error))
 
-        frames = (*unit.before, *unit.frames, *unit.after)
+        of_nobody: list[InputError] = []
         for answer in judgements(self.method, frames, catching):
-            yield from _drained(failures)
-            if answer[0] in own:
-                yield answer[0], answer
-            if unit.after and answer[0] is unit.frames[-1]:
-                break  # those after it need no answer
-        yield from _drained(failures)
+            for frame, judged in (*self._failed(caught, frames, of_nobody), (answer[0], answer)):
+                if frame in waiting:
+                    del waiting[frame]
+                    yield frame, judged
+            if unit.after and not waiting:
+                break  # those after the unit need no answer
+        for frame, error in self._failed(caught, frames, of_nobody):
+            if frame in waiting:
+                del waiting[frame]
+                yield frame, error
+        for frame in waiting:
+            none = InputError(frame.name, "has no answer", "See the errors of the scans around it.")
+            yield frame, of_nobody.pop(0) if of_nobody else none
+
+    def _failed(
+        self, caught: list[Judged], frames: Sequence[Frame], of_nobody: list[InputError]
+    ) -> Iterator[Judged]:
+        """The frames that caught errors are about.
+
+        A method of several scans may fail at a scan that was pushed before; where an error does not
+        name one, such as that of a network, it is of one that gets no answer.
+
+        Args:
+            caught: Each error, with the frame that was pushed; emptied.
+            frames: All frames that were pushed.
+            of_nobody: Takes the errors that name no frame.
+        """
+        while caught:
+            pushed, error = caught.pop(0)
+            assert isinstance(error, InputError)
+            if not self.method.window.is_one_scan:
+                named = [frame for frame in frames if frame.name == str(error.subject)]
+                if not named:
+                    of_nobody.append(error)
+                    continue
+                pushed = named[0]
+            yield pushed, error
 
     def options(self, command: str, source: Sequence[Frame], block: int) -> dict[str, Any]:
         """What the answers depend on but the scans, for the job of a command.
@@ -80,14 +116,8 @@ class UnitJudging(Work[FrameUnit, ResultT]):
             "derain": derain.__version__,
             **parameters,
             "method": Path(parameters["method"]).name,
-            "fingerprint": self.fingerprint,
+            "content of the method": self.fingerprint,
             "block": block,
             "columns": sorted({",".join(frame.columns) for frame in files}),
             "intensity_scale": sorted({frame.intensity_scale for frame in source}),
         }
-
-
-def _drained(failures: list[Judged]) -> Iterator[Judged]:
-    """Takes failures from the beginning of a list, until it is empty."""
-    while failures:
-        yield failures.pop(0)

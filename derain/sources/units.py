@@ -26,16 +26,23 @@ BLOCK = 50
 class Division:
     """How a source is divided into units.
 
+    Example:
+        >>> report = derain.clean(
+        ...     "scan.bin", derain.Derainer(), "cleaned", division=Division(keep_records=True)
+        ... )
+        >>> len(report.scans), report.before
+        (1, 0)
+
     Attributes:
         block: Scans of a block of a long recording.
-        shard: The share of the units that is done; None for all.
-        resume: Whether a record is kept even where there is only one unit.
+        shard: The shard of the units that is done; None for all.
+        keep_records: Whether records are kept even of fewer scans than a block has.
         anew: Whether everything is done again, whatever the records of the folder are of.
     """
 
     block: int = BLOCK
     shard: Shard | None = None
-    resume: bool = False
+    keep_records: bool = False
     anew: bool = False
 
     def keeps_records(self, source: Sequence[Frame], folder: Place) -> bool:
@@ -45,7 +52,7 @@ class Division:
             source: The scans.
             folder: The folder of the results.
         """
-        asked = self.resume or self.anew or self.shard is not None
+        asked = self.keep_records or self.anew or self.shard is not None
         return asked or len(source) > self.block or Job.is_begun(folder)
 
 

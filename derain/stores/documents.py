@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -110,8 +109,11 @@ class FileDocuments(Documents):
                 os.replace(written, path)
 
     def remove_all(self) -> None:
-        """Removes the folder."""
-        shutil.rmtree(self._folder, ignore_errors=True)
+        """Removes the folder, at once for whoever reads it."""
+        if not self._folder.exists():
+            return
+        with writing(self._folder), temporary_folder(self._folder.parent) as temporary:
+            os.replace(self._folder, temporary / self._folder.name)
 
 
 class ObjectDocuments(Documents):

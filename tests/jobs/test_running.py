@@ -132,7 +132,19 @@ def test_the_status_names_what_is_to_be_done_again(out: Path) -> None:
 
 def test_a_folder_without_a_job_has_no_status(out: Path) -> None:
     (out / ".derain").mkdir()
+    with pytest.raises(InputError, match="no records of a job"):
+        Job.at(out)
     for content in ("", "[]", json.dumps({"options": 3, "shards": None})):
         (out / ".derain" / "job.json").write_text(content)
-        with pytest.raises(InputError, match="no records of a job"):
+        with pytest.raises(InputError, match=r"job\.json, are damaged"):
             Job.at(out)
+    Job.begin(out, OPTIONS, None, anew=True)
+    with pytest.raises(InputError, match="not listed"):
+        job_status(out, lambda record: None)
+
+
+def test_processes_in_another_folder_refuse_relative_paths(out: Path) -> None:
+    task = Task(begun(out), Counting(out), folder=out)
+    with pytest.raises(InputError, match=f"they begin in {out}"):
+        task.check()
+    Task(begun(out), Counting(out), folder=Path.cwd()).check()

@@ -1,20 +1,32 @@
 """Sources in units: the union of units gives what one run gives, byte for byte."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from small_bags import small_bag
+from window_method import Between
 
 import derain
+from benchmarks.recorded_bags import Storage
 from derain.evaluation.hard_cases import scene
 from derain.export.recorded import RecordedDerainer
 from derain.jobs.shard import Shard
 from derain.jobs.workers import WorkerPool
+from derain.sources.clean_sink import Destination
+from derain.sources.cleaned_bags import BagOptions
+from derain.sources.frame import Frame
+from derain.sources.judgement import Judgement
 from derain.sources.method import Method
+from derain.sources.recent_frames import FrameInWindow
 from derain.sources.source import Source
+from derain.sources.unit_cleaning import UnitCleaning
 from derain.sources.units import Division, units_of
 from derain.sources.weather_monitor import WeatherOptions
+from derain.views.window import Window
 
 SCANS = 7
 
@@ -60,7 +72,7 @@ def test_the_union_of_units_is_what_one_run_gives(
         derain.clean(
             source, METHODS[method](), tmp_path / name, most_removed=1, weather=every, division=each
         )
-        for name, each in (("whole", None), ("units", Division(block, resume=True)))
+        for name, each in (("whole", None), ("units", Division(block, keep_records=True)))
     ]
     assert written(tmp_path / "whole") == written(tmp_path / "units")
     assert len(written(tmp_path / "whole")) == 2 * (2 * SCANS - 1)
@@ -90,6 +102,87 @@ def test_shares_and_workers_give_the_same_and_a_last_run_finds_everything_done(
     assert report.before == len(report.scans) == 2 * SCANS - 1
 
 
+class Failing(Between):
+    """Sees some scans before and after, and fails at some by an error that does not name them."""
+
+    def __init__(self, past: int, delay: int, bad: frozenset[int]) -> None:
+        self.seen = Window(past, delay)
+        super().__init__()
+        self.bad = bad
+
+    @property
+    def window(self) -> Window:
+        return self.seen
+
+    def depends_on(self, recording: Sequence[Frame]) -> Window:
+        return self.seen
+
+    def _judged(self, ready: FrameInWindow) -> Judgement:
+        if ready.frame.number in self.bad:
+            raise derain.InputError("network", f"fails at {ready.frame.number}", "Mend it.")
+        return super()._judged(ready)
+
+
+@pytest.fixture(scope="module")
+def standing() -> Source:
+    """A recording of a sensor that stands, in memory."""
+    scans = [derain.Scan.of(scene(60, seed=seed)) for seed in range(SCANS)]
+    return derain.Frames.of_scans(scans).map(lambda frame: frame.with_pose(np.eye(4)))
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    bad=st.frozensets(st.integers(0, SCANS - 1)),
+    block=st.integers(1, SCANS),
+    past=st.integers(0, 2),
+    delay=st.integers(0, 2),
+)
+def test_each_scan_of_a_unit_has_one_outcome_whichever_fail(
+    standing: Source, bad: frozenset[int], block: int, past: int, delay: int
+) -> None:
+    method = Failing(past, delay, bad)
+    for unit in units_of(standing, method, block):
+        judging = UnitCleaning(method, "", Destination("out", None, False, BagOptions()), 1.0, None)
+        outcomes = list(judging.judged(unit))
+        assert {frame for frame, _ in outcomes} == set(unit.frames)
+        assert len(outcomes) == len(unit.frames)
+        failed = {frame.number for frame, each in outcomes if isinstance(each, derain.InputError)}
+        assert failed == bad & {frame.number for frame in unit.frames}
+
+
+def test_other_poses_are_other_inputs(drive: Path) -> None:
+    method = derain.PersistenceDerainer()
+    source = derain.named_frames(drive)
+
+    def inputs(source: Source) -> list[str]:
+        return [unit.inputs for unit in units_of(source, method, 2)]
+
+    given = source.map(lambda frame: frame.with_pose(np.eye(4)))
+    assert not set(inputs(source)) & set(inputs(given))
+    before = inputs(source)
+    poses = next(drive.rglob("second/velodyne/poses.txt"))
+    poses.write_text(poses.read_text() + "\n")
+    after = inputs(derain.named_frames(drive))
+    assert [one != other for one, other in zip(before, after, strict=True)] == [
+        *[False] * 4,
+        *[True] * 4,
+    ]
+
+
+@pytest.mark.parametrize("storage", ["mcap", "ros1"])
+def test_bags_in_units_are_those_of_one_run(tmp_path: Path, storage: Storage) -> None:
+    source = derain.named_frames(small_bag(tmp_path, storage))
+    method = derain.FilterDerainer(derain.DROR(), threads=1)
+    derain.clean(source, method, tmp_path / "whole", most_removed=1)
+    with WorkerPool(1) as pool:
+        derain.clean(source, method, tmp_path / "units", most_removed=1, executor=pool)
+    assert written(tmp_path / "whole") == written(tmp_path / "units")
+    report = derain.clean(
+        source, method, tmp_path / "units", most_removed=1, division=Division(keep_records=True)
+    )
+    assert report.before == len(source)
+
+
 def test_ids_come_from_paths_and_not_from_what_else_is_there(drive: Path) -> None:
     method = derain.FilterDerainer(derain.DROR())
 
@@ -105,7 +198,7 @@ def test_a_changed_scan_is_done_again_with_the_blocks_that_see_it(
     drive: Path, tmp_path: Path
 ) -> None:
     (drive / "sequences/first/velodyne/000003.bin").unlink()
-    method, division = derain.PersistenceDerainer(), Division(2, resume=True)
+    method, division = derain.PersistenceDerainer(), Division(2, keep_records=True)
 
     def run() -> derain.CleanReport:
         source = derain.named_frames(drive)
