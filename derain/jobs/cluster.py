@@ -1,5 +1,6 @@
 """The workers of a Dask cluster as an executor."""
 
+import json
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -29,32 +30,35 @@ def dask_executor(address: str) -> Iterator[Submits]:
         InputError: No scheduler answers, or the workers have another version of derain, or none.
     """
     distributed = DISTRIBUTED.load("--dask")
-    named = _named(address)
+    scheduler = _address(address)
     try:
-        client = distributed.Client(**named, timeout=PATIENCE, set_as_default=False)
-    except (OSError, ValueError, TypeError, KeyError) as error:
+        client = distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
         raise _no_scheduler(address, str(error)) from error
     with client:
         _refuse_other_versions(client)
         yield client.get_executor(pure=False)
 
 
-def _named(address: str) -> dict[str, str]:
-    """The scheduler as Dask's client takes it.
+def _address(named: str) -> str:
+    """The address of a scheduler that listens.
+
+    Args:
+        named: The address, or the file that the scheduler writes.
 
     Raises:
-        InputError: Nobody listens there, or it is neither an address nor a file.
+        InputError: Nobody listens there, or it is neither an address nor such a file.
     """
-    if Path(address).is_file():
-        return {"scheduler_file": address}
-    parts = urlsplit(address)
     try:
+        path = Path(named)
+        address = str(json.loads(path.read_bytes())["address"]) if path.is_file() else named
+        parts = urlsplit(address)
         if parts.hostname is None or parts.port is None:
-            raise ValueError("neither a file nor an address with a port")
+            raise ValueError("neither the file of a scheduler nor an address with a port")
         socket.create_connection((parts.hostname, parts.port), PATIENCE).close()
-    except (OSError, ValueError) as error:
-        raise _no_scheduler(address, str(error)) from error
-    return {"address": address}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise _no_scheduler(named, str(error)) from error
+    return address
 
 
 def _no_scheduler(address: str, reason: str) -> InputError:

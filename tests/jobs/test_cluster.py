@@ -1,0 +1,41 @@
+"""A Dask cluster as an executor, and schedulers that are not there."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from jobs.counting import Counting
+
+from derain.errors import InputError
+from derain.jobs.cluster import dask_executor
+from derain.jobs.job import Job
+from derain.jobs.running import Task, run
+from derain.jobs.unit import Unit
+
+distributed = pytest.importorskip("distributed", reason="needs derain[cluster]")
+
+
+@pytest.fixture
+def scheduler() -> Iterator[str]:
+    """Address of a scheduler of this process, with two workers."""
+    options = {"processes": False, "dashboard_address": None, "threads_per_worker": 1}
+    with distributed.LocalCluster(n_workers=2, protocol="tcp://", **options) as cluster:
+        yield cluster.scheduler_address
+
+
+def test_its_workers_do_the_units_of_a_job(scheduler: str, tmp_path: Path) -> None:
+    units = [Unit(id=str(number), size=1, inputs="") for number in range(5)]
+    task = Task(Job.begin(tmp_path, {"command": "count"}, None), Counting(tmp_path, ("3",)))
+    with dask_executor(scheduler) as executor:
+        found = [each.result for each in run(task, units, executor)]
+    assert [each for each in found if not each.startswith("failed")] == [
+        f"{number} done" for number in (0, 1, 2, 4)
+    ]
+    assert "is broken" in found[3]
+
+
+def test_a_scheduler_that_is_not_there_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "scheduler.json").write_text("{}")
+    for address in ("tcp://127.0.0.1:9", "nowhere", str(tmp_path / "scheduler.json")):
+        with pytest.raises(InputError, match="no scheduler answers at"), dask_executor(address):
+            pass
