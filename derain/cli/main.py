@@ -40,7 +40,7 @@ SUMMARIES = {
     "view": "look at a scan, or a recording, as several methods clean it",
     "info": "describe a scan, a label file, a model or a data set",
     "bench": "compare methods on labelled scans: error, time and memory",
-    "learn": "a derainer from an unlabelled recording, in about six minutes",
+    "learn": "a derainer from an unlabelled recording, in about two minutes",
     "tune": "find a method's best parameters on labelled scans",
     "fit": "train a derainer",
     "validate": "measure a checkpoint on the validation scans",
