@@ -3,14 +3,14 @@
     python -m benchmarks.fleet drive/ --method default --block 4
     python -m benchmarks.fleet world/ --method default --kills 30 --seed 0
 
-The ways are one process, two workers of one thread, four shares one after the other, and a Dask
-scheduler with three workers. Prints seconds of each, from the start of the command to its end, and
+The ways are one process, two workers of one thread, four shards one after the other, and a Dask
+scheduler with three workers. Prints seconds of each, with those in which a cluster starts, and
 whether its results are those of one process, byte for byte.
 
-With `--kills`, it kills a worker, the Dask scheduler, the client, or a share at a random moment of
-its way's time, and runs the same command until it succeeds. Then the bytes must be the same, each
-unit must have one record, and nothing half-written may lie about. Ends with 1 where anything fell
-short. Linux only.
+With `--kills`, it kills a worker, the Dask scheduler, the client, or a shard at a random moment
+after the first unit is done, and runs the same again until it succeeds. Then the bytes must be the
+same, each unit must have one record, and nothing half-written may lie about. Ends with 1 where
+anything fell short. Linux only.
 """
 
 import argparse
@@ -20,13 +20,14 @@ import os
 import random
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,7 +35,7 @@ from benchmarks.installed import DERAIN
 from derain.evaluation.text_tables import markdown_table
 
 ADDRESS = "tcp://127.0.0.1:8797"
-SHARES, DASK_WORKERS = 4, 3
+SHARDS, DASK_WORKERS = 4, 3
 
 # A command that is killed is run again at most so often; a client may well need to see first that
 # its scheduler is gone.
@@ -84,6 +85,11 @@ def cluster(folder: Path) -> Iterator[list[subprocess.Popen[bytes]]]:
         place = str(folder / f"dask {number}")
         options = ["--nthreads", "1", "--no-dashboard", "--local-directory", place]
         processes.append(started([dask, "worker", ADDRESS, *options]))
+    while True:
+        with suppress(OSError):
+            socket.create_connection(("127.0.0.1", int(port)), 1).close()
+            break
+        time.sleep(0.1)
     try:
         yield processes
     finally:
@@ -103,25 +109,34 @@ def two_workers(run: Run, out: Path) -> None:
     subprocess.run(run.command(out, "--workers", "2"), check=True, capture_output=True)
 
 
-def four_shares(run: Run, out: Path) -> None:
-    """Cleans in four shares, one after the other."""
-    for number in range(SHARES):
-        share = f"{number}/{SHARES}"
-        subprocess.run(run.command(out, "--shard", share), check=True, capture_output=True)
+def four_shards(run: Run, out: Path) -> None:
+    """Cleans in four shards, one after the other."""
+    for number in range(SHARDS):
+        shard = f"{number}/{SHARDS}"
+        subprocess.run(run.command(out, "--shard", shard), check=True, capture_output=True)
 
 
 def dask(run: Run, out: Path) -> None:
-    """Cleans by three workers of a Dask cluster that is there."""
-    subprocess.run(run.command(out, "--dask", ADDRESS), check=True, capture_output=True)
+    """Cleans by three workers of a Dask cluster."""
+    with cluster(run.root):
+        subprocess.run(run.command(out, "--dask", ADDRESS), check=True, capture_output=True)
 
 
 OF_DASK = ("a worker of Dask", "the scheduler", "the client of Dask")
-VICTIMS = ("a worker", "the client", "a share", *OF_DASK)
+VICTIMS = ("a worker", "the client", "a shard", *OF_DASK)
+
+# In which way each of them works, and is run again.
+WAY_OF = {
+    "a worker": "two workers",
+    "the client": "two workers",
+    "a shard": "four shards",
+    **dict.fromkeys(OF_DASK, "Dask, three workers"),
+}
 
 WAYS: dict[str, Callable[[Run, Path], None]] = {
     "one process": one_process,
     "two workers": two_workers,
-    "four shares": four_shares,
+    "four shards": four_shards,
     "Dask, three workers": dask,
 }
 
@@ -137,32 +152,29 @@ def main() -> int:
     parser.add_argument("--alone", action="store_true")
     parser.add_argument("--kills", type=int, default=0)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--ways", nargs="+", choices=WAYS, default=list(WAYS))
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         options = ["--block", str(arguments.block), "--most-removed", "1"]
         options += ["--alone"] if arguments.alone else []
         source = [path.absolute() for path in arguments.source]
         run = Run(source, arguments.method, options, Path(name))
-        with cluster(run.root):
-            time.sleep(5)  # for its workers
-            seconds, sums = compared(run, arguments.ways)
+        seconds, sums = compared(run)
         wanted = sums["one process"]
         rows = [
             [way, f"{seconds[way]:.1f}", "the same" if sums[way] == wanted else "OTHER"]
-            for way in arguments.ways
+            for way in WAYS
         ]
         print(markdown_table(("way", "seconds", "bytes"), rows), flush=True)
         faults = len(set(sums.values())) - 1
         if arguments.kills:
-            faults += kill_again_and_again(run, arguments, seconds, wanted)
+            faults += kill_again_and_again(run, arguments.kills, arguments.seed, seconds, wanted)
     return int(faults > 0)
 
 
-def compared(run: Run, ways: Sequence[str]) -> tuple[dict[str, float], dict[str, str]]:
+def compared(run: Run) -> tuple[dict[str, float], dict[str, str]]:
     """Seconds of each way, and the checksum of its results."""
     seconds, sums = {}, {}
-    for way in ways:
+    for way in WAYS:
         out = run.root / way
         begun = time.monotonic()
         WAYS[way](run, out)
@@ -171,59 +183,59 @@ def compared(run: Run, ways: Sequence[str]) -> tuple[dict[str, float], dict[str,
 
 
 def kill_again_and_again(
-    run: Run, arguments: argparse.Namespace, seconds: dict[str, float], wanted: str
+    run: Run, kills: int, seed: int, seconds: dict[str, float], wanted: str
 ) -> int:
     """Kills one victim after the other, prints a table, and returns how much fell short."""
-    generator, faults = random.Random(arguments.seed), 0
-    kills, runs = Counter[str](), Counter[str]()
-    for number in range(arguments.kills):
+    generator, faults = random.Random(seed), 0
+    killed, too_late, runs = Counter[str](), Counter[str](), Counter[str]()
+    for number in range(kills):
         victim, out = VICTIMS[number % len(VICTIMS)], run.root / f"kill {number}"
-        kill_once(run, victim, out, seconds, generator)
-        kills[victim] += 1
-        again = run.command(out, "--workers", "2")
-        for _ in range(MOST_RUNS):
+        killed[victim] += 1
+        too_late[victim] += not kill_once(run, victim, out, seconds, generator)
+        while runs[victim] < MOST_RUNS * killed[victim]:
             runs[victim] += 1
-            if subprocess.run(again, capture_output=True).returncode == 0:
-                break
+            try:
+                WAYS[WAY_OF[victim]](run, out)
+            except subprocess.CalledProcessError:
+                continue
+            break
         for fault in short_of(out, wanted):
             faults += 1
             print(f"kill {number}, {victim}: {fault}", file=sys.stderr, flush=True)
         shutil.rmtree(out)
-    rows = [[victim, str(kills[victim]), str(runs[victim])] for victim in kills]
-    print(markdown_table(("killed", "times", "runs until done"), rows))
+    rows = [[each, *(str(count[each]) for count in (killed, too_late, runs))] for each in killed]
+    print(markdown_table(("killed", "times", "of them too late", "runs until done"), rows))
     print(f"{faults} fell short")
     return faults
 
 
 def kill_once(
     run: Run, victim: str, out: Path, seconds: dict[str, float], generator: random.Random
-) -> None:
-    """Starts a run, kills its victim at a random moment, and waits for the end of the run."""
+) -> bool:
+    """Kills a victim at a random moment after the first unit is done; whether it was in time."""
+    options = {"two workers": ["--workers", "2"], "four shards": ["--shard", f"1/{SHARDS}"]}
     with cluster(run.root) if victim in OF_DASK else nullcontext([]) as processes:
-        if victim == "a share":
-            way, options, part = "four shares", ("--shard", f"1/{SHARES}"), SHARES
-        elif victim in OF_DASK:
-            time.sleep(5)  # for its workers
-            way, options, part = "Dask, three workers", ("--dask", ADDRESS), 1
-        else:
-            way, options, part = "two workers", ("--workers", "2"), 1
-        client = started(run.command(out, *options))
-        time.sleep(generator.uniform(0, seconds[way] / part))
+        client = started(run.command(out, *options.get(WAY_OF[victim], ["--dask", ADDRESS])))
+        while client.poll() is None and not any((out / ".derain/units").rglob("*.json")):
+            time.sleep(0.05)
+        time.sleep(generator.uniform(0, seconds[WAY_OF[victim]] / 4))
+        in_time = client.poll() is None
         if victim == "the scheduler":
             processes[0].kill()
         elif victim == "a worker of Dask":
             processes[generator.randrange(1, len(processes))].kill()
         elif victim == "a worker":
-            if others := sorted(of_session(client.pid) - {client.pid}):  # none, at first
+            if others := sorted(of_session(client.pid) - {client.pid}):
                 os.kill(generator.choice(others), signal.SIGKILL)
         else:
             client.kill()
         try:
-            client.wait(3 * seconds[way] + 60)
+            client.wait(3 * seconds[WAY_OF[victim]] + 60)
         except subprocess.TimeoutExpired:
             print(f"{victim}: the client goes on for ever", file=sys.stderr)
             client.kill()
         end_session(client.pid)
+    return in_time
 
 
 def short_of(out: Path, wanted: str) -> Iterator[str]:
@@ -231,10 +243,11 @@ def short_of(out: Path, wanted: str) -> Iterator[str]:
     if checksum(out) != wanted:
         yield "its results are others than those of one process"
     units = [unit for unit, *_ in json.loads((out / ".derain/units.json").read_bytes())]
-    records = Path(out / ".derain/units").rglob("*.json")
+    records = (out / ".derain/units").rglob("*.json")
     found = Counter(json.loads(record.read_bytes())["unit"] for record in records)
     if found != Counter(units):
-        yield f"{len(units)} units and {found.total()} records"
+        odd = sorted((found - Counter(units)) + (Counter(units) - found))
+        yield f"units without one record each: {odd[:5]}"
     if left := [path for path in out.rglob(".derain-*") if path.exists()]:
         yield f"left lying about: {left[0]}"
 
