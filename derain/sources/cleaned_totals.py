@@ -55,11 +55,12 @@ class CleanedTotals:
 
 def _hour(seconds: float | None, recording: str) -> str:
     """The hour of a time, by its date, or within its recording."""
+    of_recording = "" if recording == "." else f"{recording}, "
     if seconds is None or not math.isfinite(seconds):
-        return f"{recording}, without times"
+        return f"{of_recording}without times"
     if seconds < UNIX_TIMES_FROM:
-        return f"{recording}, hour {int(seconds // 3600)}"
+        return f"{of_recording}hour {int(seconds // 3600)}"
     try:
         return datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%d %H:00 UTC")
     except (OverflowError, ValueError, OSError):  # for instance nanoseconds
-        return f"{recording}, without times in seconds"
+        return f"{of_recording}without times in seconds"
