@@ -80,7 +80,7 @@ class CleanSink:
                 f"is a folder for files, and {in_bag.name} is in a bag",
                 "Give --removed-topic NAME.",
             )
-        self._written = 0
+        self._written = self._written_for_it = 0
 
     def __enter__(self) -> Self:
         for folder in filter(None, (self._files.folder, self._files.removed)):
@@ -122,14 +122,16 @@ class CleanSink:
         scan = _with_probability(frame, judgement) if self.probability else judgement.scan
         removed = None if self._files.removed is None else scan.take(rain)
         self._files.write(frame, scan.take(~rain), rain, removed)
-        self.count(frame)
+        self._written += 1
 
-    def count(self, frame: Frame) -> None:
-        """Counts a scan that is written, by this sink or by one of its :attr:`destination`."""
-        self._written += not self._bags.takes(frame)
+    def count(self) -> None:
+        """Counts a scan that is written for it, by a sink of its :attr:`destination`."""
+        self._written_for_it += 1
 
     def so_far(self) -> str:
-        """Number of scans in files, and of bags, that are written."""
+        """Number of scans in files, and of bags, that are written; or of all scans, in units."""
+        if self._written_for_it:
+            return f"{self._written_for_it:,} of {len(self._source):,} scans are written"
         scans = sum(not self._bags.takes(frame) for frame in self._source)
         parts = (
             (self._written, scans, "scans"),

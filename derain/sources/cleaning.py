@@ -191,7 +191,7 @@ def _counted(
     """The same, whose written scans a sink counts that does not write them itself."""
     for result in results:
         if result.result.error is None:
-            sink.count(result.result.frame)
+            sink.count()
         yield result
 
 
