@@ -96,7 +96,8 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
         )
         write_report(results)  # the teacher's labels are worth a look, whatever follows
         _refuse_clean(results)
-        steps.begin(f"Training: {student}, {student.epochs} epochs")
+        epochs = "1 epoch" if student.epochs == 1 else f"{student.epochs} epochs"
+        steps.begin(f"Training: {student}, {epochs}")
         trained = fit(student.config, _settings(config, student), quiet=True)
         scored = trained.iou is not None
         steps.end(f"IoU {trained.iou:.3f} on held-out scans, last epoch" if scored else "trained")
