@@ -127,10 +127,11 @@ def clean(
     failures: list[InputError] = []
     before = 0
     with nullcontext(sink) if isinstance(sink, CleanSink) else CleanSink(sink, source) as opened:
-        work = UnitCleaning(method, method.fingerprint(), opened.destination, most_removed, sample)
+        work = UnitCleaning(method, "", opened.destination, most_removed, sample)
         if executor is not None or _is_stored(source, opened):
             division = replace(division or Division(), keep_records=True)
         if division is not None and division.keeps_records(source, opened.destination.folder):
+            work = replace(work, fingerprint=method.fingerprint())
             job = _job(source, work, opened, division)
             units = units_of(source, method, division.block)
             job.list_units(units)
@@ -175,7 +176,8 @@ def _at_once(
 
 def _folder_of_paths(source: Source, sink: CleanSink) -> Path | None:
     """The folder that relative paths begin in; None where there are none."""
-    paths = [frame.path for frame in source if isinstance(frame, FileFrame)]
+    files = [each for each in source if isinstance(each, FileFrame)]
+    paths = [each.path for each in files if not isinstance(each, StoredFrame)]
     paths += [] if sink.destination.is_stored else [sink.folder]
     return None if all(path.is_absolute() for path in paths) else Path.cwd()
 

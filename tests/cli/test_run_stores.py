@@ -1,6 +1,9 @@
 """``derain run`` and ``derain status`` by URLs of an object store: the bytes of a local run."""
 
+import os
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +11,7 @@ import numpy as np
 import pytest
 from small_bags import small_bag
 
+import derain
 from benchmarks.s3_server import BUCKET, Faults, file_system, s3_server
 from derain.evaluation.hard_cases import scene
 
@@ -85,6 +89,19 @@ def test_a_scan_that_is_changed_in_the_store_is_done_again(succeed, s3: Any, dri
     s3.put_file(str(drive / "000003.bin"), f"{BUCKET}/drive/000002.bin")
     again = succeed(*command)
     assert f"{SCANS} scans ({SCANS - 2} of them done before)" in again.out
+
+
+def test_processes_in_another_folder_do_what_is_in_a_store(
+    s3: Any, drive: Path, tmp_path: Path
+) -> None:
+    s3.put(str(drive), f"{BUCKET}/drive", recursive=True)
+    method = derain.FilterDerainer(derain.DROR(), threads=1)
+    elsewhere = {"initializer": os.chdir, "initargs": (tmp_path,)}
+    with ProcessPoolExecutor(1, get_context("spawn"), **elsewhere) as executor:
+        source, out = (f"s3://{BUCKET}/{name}" for name in ("drive", "out"))
+        report = derain.clean(source, method, out, most_removed=1, executor=executor)
+    assert (len(report.scans), report.not_cleaned) == (SCANS, 0)
+    assert len(in_store(s3, "out")) == 2 * SCANS
 
 
 def test_workers_read_a_store_and_write_to_a_folder(
