@@ -80,14 +80,13 @@ class Labelling(UnitJudging[LabelledScan]):
 
     def do(self, unit: FrameUnit) -> Iterator[LabelledScan]:
         """Labels the scans of a unit."""
-        own = {frame.key: frame for frame in unit.frames}
         for frame, answer in self.judged(unit.map(Frame.without_labels)):
             if isinstance(answer, InputError):
                 yield LabelledScan(frame, error=answer)
                 continue
             try:
                 with reading(Path(frame.name)):  # which names the file where the memory is full
-                    labelled = self._labelled(own[frame.key], answer)
+                    labelled = self._labelled(unit.by_key[frame.key], answer)
             except InputError as error:
                 labelled = LabelledScan(frame, error=error)
             yield labelled
@@ -117,7 +116,7 @@ class Labelling(UnitJudging[LabelledScan]):
         """The counts of a scan from its record."""
         truth = written["truth"]
         return LabelledScan(
-            next(frame for frame in unit.frames if frame.key == written["key"]),
+            unit.by_key[written["key"]],
             Answers(np.array(written["answers"], np.int64)),
             written["milliseconds"],
             None if truth is None else [np.array(cells, np.int64) for cells in truth],

@@ -167,7 +167,7 @@ def _frame(unit: FrameUnit, key: str, name: str, seconds: float | None) -> Frame
     first = unit.frames[0]
     if isinstance(first, StoredBag):
         return first.cloud(key, name, seconds)
-    return next(frame for frame in unit.frames if frame.key == key)
+    return unit.by_key[key]
 
 
 def _issues(method: Method, judgement: Judgement, most_removed: float) -> list[ScanIssue]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from hashlib import sha256
 from typing import Self
 
@@ -69,6 +70,11 @@ class FrameUnit(Unit):
     frames: tuple[Frame, ...]
     before: tuple[Frame, ...] = ()
     after: tuple[Frame, ...] = ()
+
+    @cached_property
+    def by_key(self) -> dict[str, Frame]:
+        """The frames that are judged, by their keys."""
+        return {frame.key: frame for frame in self.frames}
 
     def map(self, change: Callable[[Frame], Frame]) -> Self:
         """The same of other frames, in the same order.
