@@ -9,9 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.random import Generator
 
-from derain.simulation.arrays import Bools, Floats, Ints
+from derain.simulation.arrays import Bools, Floats, Ints, Returns
 from derain.simulation.classes import TrackClass, unpacked
-from derain.simulation.returns import Returns
 from derain.simulation.settings import Settings
 
 # Parts of a scan that are lost together: sensors send a scan in 75 (Ouster) to 180 (Velodyne)

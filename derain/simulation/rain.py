@@ -8,14 +8,14 @@ from numpy.random import Generator
 
 from derain.simulation.arrays import Columns, Floats, Ints
 from derain.simulation.classes import TrackClass
-from derain.simulation.marshall_palmer import (
+from derain.simulation.rain_field import (
     LARGEST_DROP,
+    RainField,
     draw_diameters,
     drops_per_cubic_metre,
     extinction,
     slope,
 )
-from derain.simulation.rain_field import RainField
 from derain.simulation.sensor import Returns, Sensor
 
 # Fresnel reflectivity of water (refractive index 1.328 at 905 nm) at normal incidence. That a drop

@@ -13,9 +13,15 @@ from derain.simulation.arrays import Floats
 from derain.simulation.campaign import Campaign
 from derain.simulation.classes import packed
 from derain.simulation.layouts import LAYOUTS
-from derain.simulation.marshall_palmer import INTERCEPT, extinction, slope
 from derain.simulation.objects import Surface
-from derain.simulation.rain_field import RainField, SprinkledRain, UniformRain
+from derain.simulation.rain_field import (
+    INTERCEPT,
+    RainField,
+    SprinkledRain,
+    UniformRain,
+    extinction,
+    slope,
+)
 from derain.simulation.sensor import Returns, Sensor
 from derain.simulation.street import Street, lay_out_street
 from derain.simulation.track import Track

@@ -13,9 +13,9 @@ from derain.files.extrinsics import Extrinsics
 from derain.files.packaged import packaged, packaged_or_own
 from derain.scan import Scan
 from derain.simulation.arrays import Floats, Ints
+from derain.simulation.arrays import Returns as Returns
 from derain.simulation.classes import TrackClass
 from derain.simulation.defects import Defects
-from derain.simulation.returns import Returns as Returns
 from derain.simulation.scan_pattern import rosette, unit_vectors
 from derain.simulation.settings import Settings
 from derain.views.spherical_grid import FULL_CIRCLE

@@ -21,7 +21,7 @@ from derain.scan import Scan
 from derain.simulation.campaign import SplitSequences
 from derain.simulation.classes import TrackClass, unpacked
 from derain.simulation.drawing import draw_name
-from derain.simulation.drawn_sensor import draw_sensor
+from derain.simulation.drawn_sensor import SensorSpans, draw_sensor
 from derain.simulation.flying.meeting import meet
 from derain.simulation.flying.precipitation import PrecipitationSpans
 from derain.simulation.layouts import INDOORS, LAYOUTS
@@ -29,7 +29,6 @@ from derain.simulation.places.carrier import lay_out_carrier
 from derain.simulation.places.horizon import lay_out_horizon
 from derain.simulation.sensor import Sensor
 from derain.simulation.settings import Settings, weights_of
-from derain.simulation.spans import SensorSpans
 from derain.simulation.track import Track
 
 # What the folders of a sequence are called.

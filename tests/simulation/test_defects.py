@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from derain.errors import InputError
-from derain.simulation.arrays import Floats
+from derain.simulation.arrays import Floats, Returns
 from derain.simulation.classes import TrackClass
 from derain.simulation.defects import SECTORS_OF_A_SCAN, Defects
-from derain.simulation.returns import Returns
 from derain.simulation.sensor import Sensor
 
 ROWS, COLUMNS = 40, 600

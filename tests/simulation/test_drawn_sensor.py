@@ -9,14 +9,16 @@ import yaml
 from derain.errors import InputError
 from derain.files.documents import Entry
 from derain.simulation.drawn_sensor import (
+    LOGARITHMIC_SPANS,
     MISALIGNMENT,
+    DefectSpans,
+    SensorSpans,
     draw_defects,
     draw_row_azimuths,
     draw_row_table,
     draw_sensor,
 )
 from derain.simulation.sensor import Returns, Sensor
-from derain.simulation.spans import LOGARITHMIC_SPANS, DefectSpans, SensorSpans
 
 SPANS = SensorSpans()
 

@@ -12,7 +12,7 @@ from derain.scan import Scan
 from derain.simulation import objects, shapes
 from derain.simulation.arrays import Ints
 from derain.simulation.classes import TrackClass
-from derain.simulation.layout import lay_out_track
+from derain.simulation.facility import lay_out_track
 from derain.simulation.objects import Surface
 from derain.simulation.radar import (
     ECHO_PER_AREA,

@@ -13,15 +13,6 @@ from scipy.stats import kstest, truncexpon
 from derain.simulation import rain as rain_module
 from derain.simulation.arrays import Floats
 from derain.simulation.classes import TrackClass
-from derain.simulation.marshall_palmer import (
-    INTERCEPT,
-    LARGEST_DROP,
-    SMALLEST_DROP,
-    draw_diameters,
-    drops_per_cubic_metre,
-    extinction,
-    slope,
-)
 from derain.simulation.rain import (
     DROP_REFLECTIVITY,
     Drops,
@@ -32,7 +23,18 @@ from derain.simulation.rain import (
     rain_on_beams,
     thin_out,
 )
-from derain.simulation.rain_field import RainField, SprinkledRain, UniformRain
+from derain.simulation.rain_field import (
+    INTERCEPT,
+    LARGEST_DROP,
+    SMALLEST_DROP,
+    RainField,
+    SprinkledRain,
+    UniformRain,
+    draw_diameters,
+    drops_per_cubic_metre,
+    extinction,
+    slope,
+)
 from derain.simulation.sensor import Returns, Sensor
 
 from .surfaces import random_surfaces, surfaces

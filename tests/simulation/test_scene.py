@@ -10,9 +10,8 @@ import pytest
 from derain.simulation import shapes
 from derain.simulation.campaign import Campaign, Drive
 from derain.simulation.classes import TrackClass, unpacked
-from derain.simulation.marshall_palmer import slope
 from derain.simulation.objects import Surface
-from derain.simulation.rain_field import UniformRain
+from derain.simulation.rain_field import UniformRain, slope
 from derain.simulation.scene import STRONGEST_WIND, SimulatedScene, Weather, draw_wind
 from derain.simulation.sensor import Returns, Sensor
 from derain.simulation.track import Track

@@ -14,8 +14,7 @@ from numpy.random import Generator
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import Span, log_uniform
-from derain.simulation.objects import Surface
-from derain.simulation.places.specks import PAINT, mirrored
+from derain.simulation.objects import PAINT, Surface, mirrored
 from derain.simulation.shapes import Point, Triangles, bars
 
 # Of how many specks a part is seen that returns nothing else.

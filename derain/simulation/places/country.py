@@ -10,9 +10,8 @@ from numpy.random import Generator
 from derain.simulation.arrays import Floats, Ints
 from derain.simulation.drawing import along
 from derain.simulation.objects import Surface
-from derain.simulation.places import frames, heaps, plants, relief, threads
-from derain.simulation.places.crowd import ragged_things, users
-from derain.simulation.places.placing import Line, assemble, line_up, place
+from derain.simulation.places import ground, openwork, plants
+from derain.simulation.places.placing import Line, assemble, line_up, place, ragged_things, users
 from derain.simulation.track import Track
 
 # How far what is beside the road goes on behind the sensor and ahead of it, metres.
@@ -67,15 +66,15 @@ def lay_out_country(generator: Generator) -> Track:
         *_cables(road, generator),
         *ragged_things(generator, road.beside_it, count=(10, 30), leafy=not winter),
     ]
-    uneven = relief.Relief.draw(generator.uniform(0.05, 0.5), generator)
+    uneven = ground.Relief.draw(generator.uniform(0.05, 0.5), generator)
     return assemble(_ground(road, snowy, generator), standing, uneven, generator)
 
 
 def _ground(road: Road, snowy: bool, generator: Generator) -> Iterator[Surface]:
-    surface = [relief.ASPHALT, relief.TRACK, relief.COBBLES][generator.choice(3, p=[0.6, 0.3, 0.1])]
-    fields = [relief.SNOW] if snowy else [relief.FIELD, relief.MEADOW, relief.GRAVEL]
+    surface = [ground.ASPHALT, ground.TRACK, ground.COBBLES][generator.choice(3, p=[0.6, 0.3, 0.1])]
+    fields = [ground.SNOW] if snowy else [ground.FIELD, ground.MEADOW, ground.GRAVEL]
     beyond = [fields[which] for which in generator.integers(len(fields), size=2)]
-    verge = relief.SNOW if snowy else relief.MEADOW
+    verge = ground.SNOW if snowy else ground.MEADOW
     broad = generator.uniform(1, 4)
 
     def kind_at(x: Floats, y: Floats) -> Ints:
@@ -83,7 +82,7 @@ def _ground(road: Road, snowy: bool, generator: Generator) -> Iterator[Surface]:
         field = np.where(y > road.aside + road.bend * x**2, 2, 3)
         return np.where(outside < 0, 0, np.where(outside < broad, 1, field))
 
-    yield from relief.ground_mesh([surface, verge, *beyond], kind_at, generator)
+    yield from ground.ground_mesh([surface, verge, *beyond], kind_at, generator)
 
 
 def _verges(road: Road, generator: Generator) -> Iterator[Surface]:
@@ -104,11 +103,11 @@ def _boundary(
     gaps = generator.uniform(0, 0.4)
     makes = {
         "hedge": _bare_hedge if winter else plants.hedge,
-        "wire": threads.wire_fence,
-        "mesh": threads.chain_link,
-        "bank": partial(heaps.bank, snow=snowy),
-        "rail": frames.guard_rail,
-        "gate": frames.railing,
+        "wire": openwork.wire_fence,
+        "mesh": openwork.chain_link,
+        "bank": partial(ground.bank, snow=snowy),
+        "rail": openwork.guard_rail,
+        "gate": openwork.railing,
     }
     make = makes[generator.choice(list(makes), p=[0.35, 0.2, 0.15, 0.15, 0.05, 0.1])]
     return line_up(make, line, COUNTRY_SIGHT, generator.uniform(4, 9), generator, gaps)
@@ -136,8 +135,8 @@ def _cables(road: Road, generator: Generator) -> Iterator[Surface]:
     heads = np.column_stack([x, line(x), np.full_like(x, height)])
     feet = heads * (1, 1, 0)
     for foot, head in zip(feet, heads, strict=True):
-        yield threads.cable(foot, head, 0, (0.15, 0.3), generator)
+        yield openwork.cable(foot, head, 0, (0.15, 0.3), generator)
     for number in range(generator.integers(1, 5)):
         shift = np.array([0, 0.4 * (number % 2) - 0.2, -0.4 * (number // 2)])
         for start, end in zip(heads[:-1] + shift, heads[1:] + shift, strict=True):
-            yield threads.cable(start, end, generator.uniform(0.2, 1), (0.005, 0.03), generator)
+            yield openwork.cable(start, end, generator.uniform(0.2, 1), (0.005, 0.03), generator)

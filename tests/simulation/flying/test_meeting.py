@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from derain.simulation.arrays import Floats
 from derain.simulation.classes import TrackClass
-from derain.simulation.flying.encounters import Encounters, covered_share
-from derain.simulation.flying.meeting import draw_haze, meet, uncrowded
+from derain.simulation.flying.meeting import Encounters, covered_share, draw_haze, meet, uncrowded
 from derain.simulation.flying.optics import Optics, Sizes, Slices
 from derain.simulation.flying.precipitation import KINDS, Precipitation
 from derain.simulation.rain import rain_on_beams
