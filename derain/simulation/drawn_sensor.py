@@ -10,29 +10,35 @@ from numpy.random import Generator
 
 from derain.simulation.arrays import Floats
 from derain.simulation.defects import Defects
-from derain.simulation.drawing import Span, draw_name, log_uniform
+from derain.simulation.drawing import Span, log_uniform, pick
 from derain.simulation.sensor import MOST_BEAMS, ReturnMode, Sensor
-from derain.simulation.settings import Settings, weights_of
+from derain.simulation.settings import LogSpan, Positive, Settings, Share, weights_of
 from derain.views.spherical_grid import ALL_AROUND, FULL_CIRCLE
 
 # Sensors of today have at most 256.
 MOST_ROWS = 4096
 
-# Spans that are log-uniform.
-LOGARITHMIC_SPANS = frozenset(
-    {
-        *("azimuth_step", "front_step", "rosette_beams", "prism_turns", "range_noise"),
-        *("minimum_range", "maximum_range", "detection_threshold", "beam_divergence"),
-    }
-)
+
+@dataclass(frozen=True)
+class Spans(Settings):
+    """Settings that are spans, from which values are drawn by name."""
+
+    def draw(self, name: str, generator: Generator) -> float:
+        """Draws from a span: evenly in its logarithm from a LogSpan, else evenly."""
+        span: Span = getattr(self, name)
+        kind = next(one.type for one in fields(self) if one.name == name)
+        if kind == LogSpan:
+            return log_uniform(span, generator)
+        return float(generator.uniform(*span))
 
 
 @dataclass(frozen=True)
-class DefectSpans(Settings):
+class DefectSpans(Spans):
     """What the defects of sensors are drawn from; shares are drawn evenly.
 
     Attributes:
-        none: Share of the sensors without any.
+        SUBJECT = "defect spans"
+    none: Share of the sensors without any.
         each: How probable each defect is in the others.
         dropped: See :class:`derain.simulation.defects.Defects`, as for all that follow.
         dropped_rows: Likewise.
@@ -43,8 +49,9 @@ class DefectSpans(Settings):
         copies: Likewise, of sensors that report one return. Dual ones copy all or none.
     """
 
-    none: float = 0.3
-    each: float = 0.5
+    SUBJECT = "defect spans"
+    none: Share = 0.3
+    each: Share = 0.5
     dropped: Span = (0.0, 0.3)
     dropped_rows: Span = (0.0, 0.05)
     dropped_sectors: Span = (0.0, 0.05)
@@ -53,13 +60,9 @@ class DefectSpans(Settings):
     range_step: Span = (0.002, 0.02)
     copies: Span = (0.0, 0.0)
 
-    def __post_init__(self) -> None:
-        shares = {"none": 0 <= self.none <= 1, "each": 0 <= self.each <= 1}
-        self._refuse_impossible("defect spans", shares)
-
 
 @dataclass(frozen=True)
-class SensorSpans(Settings):
+class SensorSpans(Spans):
     """What sensors are drawn from. The defaults span the sensors of today.
 
     Angles are in degrees, distances in metres. Spans of a decade or more are
@@ -104,40 +107,41 @@ class SensorSpans(Settings):
         InputError: A value that is impossible.
     """
 
+    SUBJECT = "sensor spans"
     kinds: Mapping[str, float] = field(
         default_factory=lambda: {"spinning": 0.7, "front": 0.2, "rosette": 0.1}
     )
     spinning_rows: tuple[int, ...] = (16, 32, 40, 64, 128)
     spinning_field: Span = (20.0, 90.0)
     spinning_centre: Span = (-12.0, 0.0)
-    azimuth_step: Span = (0.08, 0.4)
-    uneven: float = 0.5
+    azimuth_step: LogSpan = (0.08, 0.4)
+    uneven: Share = 0.5
     row_azimuth: Span = (0.0, 5.0)
     front_rows: tuple[int, ...] = (64, 96, 128, 192, 256)
     front_width: Span = (60.0, 120.0)
     front_height: Span = (12.0, 40.0)
-    front_step: Span = (0.08, 0.3)
+    front_step: LogSpan = (0.08, 0.3)
     rosette_width: Span = (38.0, 75.0)
-    rosette_beams: Span = (10_000.0, 60_000.0)
-    prism_turns: Span = (8.0, 40.0)
+    rosette_beams: LogSpan = (10_000.0, 60_000.0)
+    prism_turns: LogSpan = (8.0, 40.0)
     most_beams: int = 150_000
     returns: Mapping[str, float] = field(
         default_factory=lambda: {"strongest": 0.6, "last": 0.1, "dual": 0.3}
     )
-    range_noise: Span = (0.005, 0.05)
+    range_noise: LogSpan = (0.005, 0.05)
     range_noise_growth: Span = (0.0, 0.0005)
     weak_range_noise: Span = (0.0, 0.05)
     encoder_noise: Span = (0.0, 0.02)
     intensity_noise: Span = (0.05, 0.3)
     mounting_height: Span = (0.3, 2.8)
     tilt: Span = (0.0, 4.0)
-    head_down: float = 0.1
+    head_down: Share = 0.1
     head_down_pitch: Span = (10.0, 25.0)
-    minimum_range: Span = (0.3, 3.0)
-    maximum_range: Span = (50.0, 250.0)
-    detection_threshold: Span = (3e-7, 5e-5)
+    minimum_range: LogSpan = (0.3, 3.0)
+    maximum_range: LogSpan = (50.0, 250.0)
+    detection_threshold: LogSpan = (3e-7, 5e-5)
     aperture: Span = (0.0, 0.012)
-    beam_divergence: Span = (1e-3, 4e-3)
+    beam_divergence: LogSpan = (1e-3, 4e-3)
     frame_rate: Span = (5.0, 20.0)
     defects: DefectSpans = field(default_factory=DefectSpans)
     READ_BY: ClassVar = {
@@ -145,40 +149,20 @@ class SensorSpans(Settings):
         "returns": weights_of(*get_args(ReturnMode)),
     }
 
-    def __post_init__(self) -> None:
-        possible = {
+    def _possible(self) -> dict[str, bool]:
+        return {
             "spinning_rows": _are_rows(self.spinning_rows),
             "front_rows": _are_rows(self.front_rows),
             "most_beams": 1 <= self.most_beams <= MOST_BEAMS,
-            "uneven": 0 <= self.uneven <= 1,
-            "head_down": 0 <= self.head_down <= 1,
         }
-        for name in LOGARITHMIC_SPANS:
-            low, high = getattr(self, name)
-            possible[name] = 0 < low <= high < math.inf
-        self._refuse_impossible("sensor spans", possible)
 
 
 def _are_rows(rows: tuple[int, ...]) -> bool:
     return bool(rows) and all(2 <= count <= MOST_ROWS for count in rows)
 
 
-def draw(spans: DefectSpans | SensorSpans, name: str, generator: Generator) -> float:
-    """Draws a value from a span.
-
-    Args:
-        spans: What has it.
-        name: Its name.
-        generator: Random generator.
-    """
-    span: Span = getattr(spans, name)
-    if name in LOGARITHMIC_SPANS:
-        return log_uniform(span, generator)
-    return float(generator.uniform(*span))
-
-
 # The numbers of any sensor, drawn from the spans of their names.
-NUMBERS = [one.name for one in fields(Sensor) if one.type is float]
+NUMBERS = [one.name for one in fields(Sensor) if one.type in (float, Positive)]
 
 # Defects that only some sensors have.
 DEFECTS = ("dropped", "dropped_rows", "dropped_sectors", "mixed", "range_step", "copies")
@@ -202,12 +186,12 @@ def draw_sensor(spans: SensorSpans, generator: Generator) -> Sensor:
         InputError: The spans allow for what no sensor can be, and it was drawn.
     """
     patterns = {"spinning": _spinning, "front": _front, "rosette": _rosette}
-    pattern = patterns[draw_name(spans.kinds, generator)](spans, generator)
-    roll, pitch = (draw(spans, "tilt", generator) * generator.choice([-1, 1]) for _ in range(2))
+    pattern = patterns[pick(spans.kinds, generator)](spans, generator)
+    roll, pitch = (spans.draw("tilt", generator) * generator.choice([-1, 1]) for _ in range(2))
     if generator.random() < spans.head_down:
-        pitch += draw(spans, "head_down_pitch", generator)
-    returns: Any = draw_name(spans.returns, generator)
-    drawn: dict[str, Any] = {name: draw(spans, name, generator) for name in NUMBERS}
+        pitch += spans.draw("head_down_pitch", generator)
+    returns: Any = pick(spans.returns, generator)
+    drawn: dict[str, Any] = {name: spans.draw(name, generator) for name in NUMBERS}
     return Sensor(
         **pattern,
         **drawn,
@@ -227,24 +211,24 @@ def draw_defects(spans: DefectSpans, generator: Generator, *, dual: bool) -> Def
             two of every beam, be they the same.
     """
     some = generator.random() >= spans.none
-    values = {name: draw(spans, name, generator) for name in DEFECTS}
+    values = {name: spans.draw(name, generator) for name in DEFECTS}
     has = {name: some and generator.random() < spans.each for name in DEFECTS}
     if dual:
         values["copies"], has["copies"] = 1.0, generator.random() < 0.5
     return Defects(
         **{name: value for name, value in values.items() if has[name]},
-        merging=draw(spans, "merging", generator),
+        merging=spans.draw("merging", generator),
     )
 
 
 def _spinning(spans: SensorSpans, generator: Generator) -> dict[str, Any]:
     rows = int(generator.choice(spans.spinning_rows))
-    height = min(draw(spans, "spinning_field", generator) for _ in range(2))
-    centre = draw(spans, "spinning_centre", generator)
+    height = min(spans.draw("spinning_field", generator) for _ in range(2))
+    centre = spans.draw("spinning_centre", generator)
     inclination = max(centre - height / 2, -90.0), min(centre + height / 2, 90.0)
     even = generator.random() >= spans.uneven
-    turned = draw(spans, "row_azimuth", generator)
-    step = draw(spans, "azimuth_step", generator)
+    turned = spans.draw("row_azimuth", generator)
+    step = spans.draw("azimuth_step", generator)
     return {
         "azimuth": ALL_AROUND,
         "inclination": inclination,
@@ -257,21 +241,21 @@ def _spinning(spans: SensorSpans, generator: Generator) -> dict[str, Any]:
 
 def _front(spans: SensorSpans, generator: Generator) -> dict[str, Any]:
     rows = int(generator.choice(spans.front_rows))
-    width, height = (draw(spans, name, generator) for name in ("front_width", "front_height"))
-    centre = draw(spans, "spinning_centre", generator) / 2
+    width, height = (spans.draw(name, generator) for name in ("front_width", "front_height"))
+    centre = spans.draw("spinning_centre", generator) / 2
     return {
         "azimuth": (-width / 2, width / 2),
         "inclination": (centre - height / 2, centre + height / 2),
         "rows": rows,
-        "columns": _columns(width, draw(spans, "front_step", generator), rows, spans),
+        "columns": _columns(width, spans.draw("front_step", generator), rows, spans),
     }
 
 
 def _rosette(spans: SensorSpans, generator: Generator) -> dict[str, Any]:
-    radius = draw(spans, "rosette_width", generator) / 2
+    radius = spans.draw("rosette_width", generator) / 2
     lasers = int(generator.choice(LASERS))
-    beams = min(round(draw(spans, "rosette_beams", generator)), spans.most_beams)
-    turns = draw(spans, "prism_turns", generator)
+    beams = min(round(spans.draw("rosette_beams", generator)), spans.most_beams)
+    turns = spans.draw("prism_turns", generator)
     return {
         "pattern": "rosette",
         "azimuth": (-radius, radius),

@@ -11,7 +11,8 @@ from derain.simulation.arrays import Floats
 
 Triangles = Floats
 
-# x, y and z, metres.
+# x and y, and x, y and z, metres.
+Place = tuple[float, float]
 Point = tuple[float, float, float]
 
 

@@ -28,7 +28,7 @@ from derain.simulation import sequence
 from derain.simulation.arrays import Bools
 from derain.simulation.campaign import Campaign
 from derain.simulation.classes import TrackClass
-from derain.simulation.dataset import ensure_track, simulate_track
+from derain.simulation.dataset import simulate_track
 from derain.simulation.manifest import read_manifest
 from derain.simulation.sensor import Sensor
 
@@ -158,7 +158,7 @@ def test_a_data_set_that_is_there_is_not_made_twice_with_and_without_locks(
     before = times(track)
     simulate_track(track, TINY)
     monkeypatch.setitem(sys.modules, "fcntl", None)
-    ensure_track(track, TINY)
+    simulate_track(track, TINY, keep=False)
     assert times(track) == before
 
 
@@ -187,7 +187,7 @@ def test_a_data_set_made_for_a_program_is_replaced_by_that_of_another_campaign(
     root, scan = tmp_path / "track", "sequences/000/lidar_radar_pcd/000000.bin"
     written = set()
     for seed in (0, 1, 2):
-        ensure_track(root, replace(ONE, seed=seed))
+        simulate_track(root, replace(ONE, seed=seed), keep=False)
         assert read_manifest(root)["campaign"]["seed"] == seed
         written.add((root / scan).read_bytes())
         if seed == 1:  # as a replacement leaves it that is killed
@@ -205,9 +205,9 @@ def test_what_others_made_or_cannot_be_is_left_alone(track: Path, tmp_path: Path
         (tmp_path / "thesis.txt", TINY, "is not a folder"),
         (tmp_path / "new", replace(TINY, sensor="mars"), "mars: no such sensor"),
     ):
-        for make in (simulate_track, ensure_track):
+        for keep in (True, False):
             with pytest.raises(InputError, match=reason):
-                make(root, campaign)
+                simulate_track(root, campaign, keep=keep)
     assert times(track) | times(tmp_path) == before
 
 

@@ -1,6 +1,5 @@
 """Beams on their way through all that flies: what they meet, and what the sensor reports."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -17,21 +16,6 @@ from derain.simulation.sensor import Returns, Sensor
 
 # A particle leaves at least so much of the light, a modelling choice: a little goes around it.
 LEAST_LEFT = 1e-3
-
-
-@dataclass(frozen=True, eq=False)
-class Population:
-    """Particles of a kind.
-
-    Attributes:
-        number: Particles per cubic metre where they are densest, m⁻³.
-        sizes: Their diameters.
-        region: Where they fly.
-    """
-
-    number: float
-    sizes: Sizes
-    region: Region
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,38 +56,40 @@ class Encounters(Columns):
         return np.asarray(2 * np.log(np.maximum(1 - self.covered, LEAST_LEFT)))
 
 
-def encounter(
-    populations: Sequence[Population], beams: OpenBeams, flicker: float, generator: Generator
-) -> Encounters:
-    """Draws what the beams meet of all that flies.
+@dataclass(frozen=True, eq=False)
+class Population:
+    """Particles of a kind.
 
-    Args:
-        populations: What flies, at least one.
-        beams: The beams.
-        flicker: By what share the reflectivity of single particles falls short at most.
-        generator: Random generator.
+    Attributes:
+        number: Particles per cubic metre where they are densest, m⁻³.
+        sizes: Their diameters.
+        region: Where they fly.
     """
-    met = [_encounters_with(population, beams, flicker, generator) for population in populations]
-    return Encounters.joined(met).ordered()
 
+    number: float
+    sizes: Sizes
+    region: Region
 
-def _encounters_with(
-    population: Population, beams: OpenBeams, flicker: float, generator: Generator
-) -> Encounters:
-    stretch = population.region.stretch(beams.directions, beams.stretch)
-    particles, meetings = draw_particles(
-        population.number, population.sizes, stretch, beams, generator
-    )
-    # The density is uneven: of the densest, its share stays.
-    there = generator.random(len(particles.diameter)) < population.region.density(particles.place)
-    brightness = beams.optics.brightness * (1 - flicker * generator.random(len(there)))
-    meetings = meetings.take(there[meetings.particle])
-    particle = meetings.particle
-    diameter, centre = particles.diameter[particle], particles.range[particle]
-    covered = covered_share(beams.optics.width(centre), diameter, meetings.offset)
-    # A beam is returned from somewhere between the particle's front and its middle.
-    front = centre - diameter / 2 * generator.random(len(particle))
-    return Encounters(meetings.beam, front, covered, brightness[particle])
+    def met_by(self, beams: OpenBeams, flicker: float, generator: Generator) -> Encounters:
+        """Draws what beams meet of them.
+
+        Args:
+            beams: The beams.
+            flicker: By what share the reflectivity of single particles falls short at most.
+            generator: Random generator.
+        """
+        stretch = self.region.stretch(beams.directions, beams.stretch)
+        particles, meetings = draw_particles(self.number, self.sizes, stretch, beams, generator)
+        # The density is uneven: of the densest, its share stays.
+        there = generator.random(len(particles.diameter)) < self.region.density(particles.place)
+        brightness = beams.optics.brightness * (1 - flicker * generator.random(len(there)))
+        meetings = meetings.take(there[meetings.particle])
+        particle = meetings.particle
+        diameter, centre = particles.diameter[particle], particles.range[particle]
+        covered = covered_share(beams.optics.width(centre), diameter, meetings.offset)
+        # A beam is returned from somewhere between the particle's front and its middle.
+        front = centre - diameter / 2 * generator.random(len(particle))
+        return Encounters(meetings.beam, front, covered, brightness[particle])
 
 
 def covered_share(beam: Floats, particle: Floats, offset: Floats) -> Floats:
@@ -140,11 +126,7 @@ PATCH = 0.15
 
 
 def meet(
-    clear: Returns,
-    beams: Floats,
-    precipitation: Precipitation,
-    sensor: Sensor,
-    generator: Generator,
+    clear: Returns, beams: Floats, weather: Precipitation, sensor: Sensor, generator: Generator
 ) -> Returns:
     """Sends beams through what flies and keeps what the sensor reports of each.
 
@@ -158,7 +140,7 @@ def meet(
         clear: What each beam would return through clear air to a perfect detector: one row for
             each of the N beams, in their order.
         beams: Unit vectors along them, float64 (N, 3), sensor frame.
-        precipitation: What flies.
+        weather: What flies.
         sensor: The sensor that they belong to.
         generator: Random generator.
 
@@ -166,55 +148,50 @@ def meet(
         What the sensor detects, one row for each beam, what flies labelled RAIN; of a sensor with
         dual returns a second row where the last return is not the strongest.
     """
-    optics = Optics.of(precipitation, sensor)
-    sizes = Sizes.gamma(precipitation.diameter, precipitation.shape, precipitation.largest)
-    falling = uncrowded(precipitation, optics, sizes)
-    gusts = Gusts(
-        precipitation.gust_form,
-        precipitation.gust_length,
-        precipitation.gust_contrast,
-        precipitation.gust_seed,
-    )
+    optics = Optics.of(weather, sensor)
+    sizes = Sizes.gamma(weather.diameter, weather.shape, weather.largest)
+    falling = uncrowded(weather, optics, sizes)
+    gusts = Gusts(weather.gust_form, weather.gust_length, weather.gust_contrast, weather.gust_seed)
     extinction = falling * gusts.mean * sizes.extinction
     ground = -sensor.mounting_height
-    layer = GroundLayer(ground, precipitation.drift_height, gusts)
-    plumes = draw_plumes(
-        clear, beams, ground, precipitation.plumes, precipitation.plume_length, generator
-    )
+    layer = GroundLayer(ground, weather.drift_height, gusts)
+    plumes = draw_plumes(clear, beams, ground, weather.plumes, weather.plume_length, generator)
     populations = [
         Population(falling, sizes, gusts),
-        Population(falling * precipitation.drift, sizes, layer),
-        *(Population(precipitation.plume_number, SPRAY, plume) for plume in plumes),
+        Population(falling * weather.drift, sizes, layer),
+        *(Population(weather.plume_number, SPRAY, plume) for plume in plumes),
     ]
     stretch = Stretch(np.full(len(beams), optics.nearest), clear.range)
     open_beams = OpenBeams(beams, stretch, optics)
-    met = encounter(populations, open_beams, precipitation.flicker, generator)
+    met = Encounters.joined(
+        population.met_by(open_beams, weather.flicker, generator) for population in populations
+    ).ordered()
     transmission = met.transmission(len(beams)) * np.exp(-2 * extinction * clear.range)
     candidates = [
         sensor.detected(clear, transmission),
-        _detected_particles(met, extinction, clear, precipitation, sensor, generator),
-        draw_haze(clear, beams, precipitation, optics, generator),
+        _detected_particles(met, extinction, clear, weather, sensor, generator),
+        draw_haze(clear, beams, weather, optics, generator),
     ]
     return sensor.reported(Returns.joined(candidates))
 
 
-def uncrowded(precipitation: Precipitation, optics: Optics, sizes: Sizes) -> float:
+def uncrowded(weather: Precipitation, optics: Optics, sizes: Sizes) -> float:
     """Falling particles per cubic metre, so few that no more than the crowding meet an open beam.
 
     Args:
-        precipitation: What falls.
+        weather: What falls.
         optics: What the sensor sees of it.
         sizes: Diameters of the particles.
     """
     met = float(Slices(optics.nearest, optics, sizes).met.sum())
-    return min(precipitation.number, precipitation.crowding / met if met else precipitation.number)
+    return min(weather.number, weather.crowding / met if met else weather.number)
 
 
 def _detected_particles(
     met: Encounters,
     extinction: float,
     clear: Returns,
-    precipitation: Precipitation,
+    weather: Precipitation,
     sensor: Sensor,
     generator: Generator,
 ) -> Returns:
@@ -224,7 +201,7 @@ def _detected_particles(
     seen = reflectivity >= needed
     distance, beam = met.range[seen], met.beam[seen]
     reflectivity, needed = reflectivity[seen], needed[seen]
-    spread = precipitation.jitter * np.sqrt(needed / reflectivity)
+    spread = weather.jitter * np.sqrt(needed / reflectivity)
     measured = distance + spread * generator.normal(size=len(distance))
     # Between the sensor's limits, and not behind the surface that ends the beam.
     measured = np.maximum(np.minimum(measured, clear.range[beam]), sensor.minimum_range)
@@ -238,11 +215,7 @@ def _detected_particles(
 
 
 def draw_haze(
-    clear: Returns,
-    beams: Floats,
-    precipitation: Precipitation,
-    optics: Optics,
-    generator: Generator,
+    clear: Returns, beams: Floats, weather: Precipitation, optics: Optics, generator: Generator
 ) -> Returns:
     """Draws what a haze returns: of a share of the beams, exponentially distributed in distance.
 
@@ -254,19 +227,19 @@ def draw_haze(
     Args:
         clear: What each beam would return through clear air.
         beams: Unit vectors along them, float64 (N, 3), sensor frame.
-        precipitation: What flies, the haze in it.
+        weather: What flies, the haze in it.
         optics: What the sensor sees of it.
         generator: Random generator.
     """
-    share = np.full(len(beams), precipitation.haze)
-    if precipitation.haze_patches and len(beams):
-        field = Gusts("gusts", PATCH, precipitation.haze_patches, precipitation.gust_seed + 1)
+    share = np.full(len(beams), weather.haze)
+    if weather.haze_patches and len(beams):
+        field = Gusts("gusts", PATCH, weather.haze_patches, weather.gust_seed + 1)
         patches = field.density(beams)
         share *= patches / max(patches.mean(), 1e-9)
     lit = np.flatnonzero(generator.random(len(beams)) < share)
-    depth = generator.exponential(precipitation.haze_depth, len(lit))
+    depth = generator.exponential(weather.haze_depth, len(lit))
     distance = optics.nearest + depth
-    ratio = precipitation.haze_strength ** generator.random(len(lit))
+    ratio = weather.haze_strength ** generator.random(len(lit))
     in_front = distance < np.minimum(clear.range[lit], optics.farthest)
     lit, distance = lit[in_front], distance[in_front]
     power = optics.threshold * ratio[in_front]

@@ -8,17 +8,7 @@ from numpy.random import Generator
 from derain.simulation import objects
 from derain.simulation.arrays import Floats, Ints
 from derain.simulation.objects import Options, Piece, Surface
-from derain.simulation.places import ground, openwork, plants, road_users, walls
-from derain.simulation.places.placing import (
-    assemble,
-    choose,
-    free_places,
-    line_up,
-    place,
-    ragged_things,
-    scatter,
-    shuffled,
-)
+from derain.simulation.places import ground, openwork, placing, plants, road_users, walls
 from derain.simulation.track import Track
 
 # Rows of lots on either side of lanes, metres: how long a lot is, how wide, and a lane.
@@ -42,10 +32,10 @@ def lay_out_car_park(generator: Generator) -> Track:
         *_people(aside, generator),
         *_between(aside, winter, generator),
         *_edge(winter, generator),
-        *ragged_things(generator, _far_off, count=(3, 10), leafy=not winter),
+        *placing.ragged_things(generator, _far_off, count=(3, 10), leafy=not winter),
     ]
     uneven = ground.Relief.draw(generator.uniform(0.01, 0.12), generator)
-    return assemble(_ground(winter, generator), standing, uneven, generator)
+    return placing.assemble(_ground(winter, generator), standing, uneven, generator)
 
 
 def _far_off(x: float, y: float) -> bool:
@@ -75,7 +65,7 @@ def _rows(aside: float, generator: Generator) -> Iterator[Surface]:
                 make = road_users.glazed_car if near else objects.car
                 heading = np.pi / 2 * generator.choice([-1, 1]) + generator.normal(0, 0.04)
                 nudged = x + generator.normal(0, 0.12), y + generator.normal(0, 0.25)
-                yield from place(make(generator), *nudged, heading)
+                yield from placing.place(make(generator), *nudged, heading)
 
 
 def _people(aside: float, generator: Generator) -> Iterator[Surface]:
@@ -87,9 +77,9 @@ def _people(aside: float, generator: Generator) -> Iterator[Surface]:
         return max(abs(x), abs(y)) < HALF_SIZE and across < LANE / 2 + 0.8
 
     for count, distances in (((6, 16), (2.2, 35)), (6, (15, 50))):
-        makes = choose([(road_users.person, 8), (road_users.cyclist, 1)], count, generator)
-        places = free_places(len(makes), distances, 0.9, generator, in_a_lane)
-        yield from scatter(makes, places, generator)
+        makes = placing.choose([(road_users.person, 8), (road_users.cyclist, 1)], count, generator)
+        places = placing.free_places(len(makes), distances, 0.9, generator, in_a_lane)
+        yield from placing.scatter(makes, places, generator)
 
 
 def _between(aside: float, winter: bool, generator: Generator) -> Iterator[Surface]:
@@ -100,16 +90,16 @@ def _between(aside: float, winter: bool, generator: Generator) -> Iterator[Surfa
         (openwork.thin_pole, 2),
         (_sapling, 1),
     ]
-    small = shuffled(choose(kinds, (8, 25), generator), generator)
+    small = placing.shuffled(placing.choose(kinds, (8, 25), generator), generator)
 
     def at_its_edge(x: float, y: float) -> bool:
         return abs(x) < HALF_SIZE and abs(abs(y - aside) - LANE / 2 - 0.3) < 0.5
 
-    places = free_places(len(small), (2.2, 35), 0.5, generator, at_its_edge)
-    yield from scatter(small, places, generator)
+    places = placing.free_places(len(small), (2.2, 35), 0.5, generator, at_its_edge)
+    yield from placing.scatter(small, places, generator)
     for x in np.arange(-HALF_SIZE, HALF_SIZE, generator.uniform(10, 20)):
         y = aside + LANE / 2 + LOT_LENGTH + 0.15
-        yield from place(plants.tree(winter, generator), x, y)
+        yield from placing.place(plants.tree(winter, generator), x, y)
     if winter:
         bank = ground.bank(generator.uniform(4, 12), generator, snow=True)
         yield bank.placed(generator.uniform(3, 20), aside - LANE / 2 - 1)
@@ -122,7 +112,9 @@ def _edge(winter: bool, generator: Generator) -> Iterator[Surface]:
     for quarter in range(4):
         make = makes[generator.integers(len(makes))]
         piece = 19.0 if make is walls.facade else 9.5
-        for surface in line_up(make, HALF_SIZE, (-HALF_SIZE, HALF_SIZE), piece, generator, 0.15):
+        for surface in placing.line_up(
+            make, HALF_SIZE, (-HALF_SIZE, HALF_SIZE), piece, generator, 0.15
+        ):
             yield surface.placed(0, 0, quarter * np.pi / 2)
 
 
@@ -132,7 +124,7 @@ def _nets(length: float, generator: Generator) -> Surface:
 
 def _brushes(length: float, generator: Generator) -> Iterator[Surface]:
     for x in np.arange(0, length, 1.0):
-        yield from place(plants.brushwood(generator.uniform(0.8, 2), generator), x, 0)
+        yield from placing.place(plants.brushwood(generator.uniform(0.8, 2), generator), x, 0)
 
 
 def _sapling(generator: Generator) -> Iterable[Surface]:

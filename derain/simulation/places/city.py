@@ -9,18 +9,7 @@ from numpy.random import Generator
 from derain.simulation import objects
 from derain.simulation.drawing import along
 from derain.simulation.objects import Surface
-from derain.simulation.places import ground, openwork, plants, road_users, walls
-from derain.simulation.places.placing import (
-    assemble,
-    choose,
-    free_places,
-    line_up,
-    place,
-    ragged_things,
-    scatter,
-    shuffled,
-    users,
-)
+from derain.simulation.places import ground, openwork, placing, plants, road_users, walls
 from derain.simulation.track import Track
 
 CITY_SIGHT = (-60.0, 85.0)
@@ -66,15 +55,15 @@ def lay_out_city(generator: Generator) -> Track:
     standing = [
         *_houses(section, generator),
         *_parked(section, generator),
-        *users(generator, section.on_the_road, walkers=(2, 8), cars=(1, 5)),
+        *placing.users(generator, section.on_the_road, walkers=(2, 8), cars=(1, 5)),
         *_people(section, generator),
         *_furniture(section, winter, generator),
         *_works(section, generator),
-        *ragged_things(generator, section.on_a_pavement, count=(2, 12), leafy=not winter),
+        *placing.ragged_things(generator, section.on_a_pavement, count=(2, 12), leafy=not winter),
     ]
     uneven = ground.Relief.draw(generator.uniform(0.01, 0.1), generator)
     over = _cables(section, generator)
-    return assemble(_ground(section, generator), standing, uneven, generator, over)
+    return placing.assemble(_ground(section, generator), standing, uneven, generator, over)
 
 
 def _ground(section: Section, generator: Generator) -> Iterator[Surface]:
@@ -88,11 +77,11 @@ def _ground(section: Section, generator: Generator) -> Iterator[Surface]:
 def _houses(section: Section, generator: Generator) -> Iterator[Surface]:
     for side, front in zip((-1, 1), section.fronts, strict=True):
         gaps, piece = generator.uniform(0, 0.3), generator.uniform(9, 18)
-        for house in line_up(walls.facade, abs(front), CITY_SIGHT, piece, generator, gaps):
+        for house in placing.line_up(walls.facade, abs(front), CITY_SIGHT, piece, generator, gaps):
             # Houses are seen from the street: those on the right are those on the left, turned.
             yield house if side > 0 else house.placed(CITY_SIGHT[0] + CITY_SIGHT[1], 0, np.pi)
     far = walls.facade(30, generator)
-    yield from place(far, CITY_SIGHT[1], 15, -np.pi / 2)
+    yield from placing.place(far, CITY_SIGHT[1], 15, -np.pi / 2)
 
 
 def _parked(section: Section, generator: Generator) -> Iterator[Surface]:
@@ -103,14 +92,14 @@ def _parked(section: Section, generator: Generator) -> Iterator[Surface]:
             if generator.random() < full and np.hypot(x, y) > 3.9:
                 make = road_users.glazed_car if abs(x) < 30 else objects.car
                 heading = generator.normal(0, 0.03) + np.pi * generator.integers(2)
-                yield from place(make(generator), x, y, heading)
+                yield from placing.place(make(generator), x, y, heading)
 
 
 def _people(section: Section, generator: Generator) -> Iterator[Surface]:
-    makes = choose([(road_users.person, 8), (road_users.cyclist, 2)], 18, generator)
+    makes = placing.choose([(road_users.person, 8), (road_users.cyclist, 2)], 18, generator)
     count = int(generator.integers(4, 18))
-    places = free_places(count, (2.5, 55), 0.8, generator, section.on_a_pavement)
-    yield from scatter(makes, places, generator)
+    places = placing.free_places(count, (2.5, 55), 0.8, generator, section.on_a_pavement)
+    yield from placing.scatter(makes, places, generator)
 
 
 def _furniture(section: Section, winter: bool, generator: Generator) -> Iterator[Surface]:
@@ -118,11 +107,11 @@ def _furniture(section: Section, winter: bool, generator: Generator) -> Iterator
     for kerb, side in zip(section.kerbs, (-1, 1), strict=True):
         for x in along(*CITY_SIGHT, (6, 30), generator):
             tree = plants.tree(winter, generator)
-            yield from place(tree, x, kerb + side * generator.uniform(0.5, 1))
-        makes = choose([(openwork.thin_pole, 3), (openwork.bollard, 2)], 40, generator)
-        mixed, places = shuffled(makes, generator), along(*CITY_SIGHT, (1, 7), generator)
+            yield from placing.place(tree, x, kerb + side * generator.uniform(0.5, 1))
+        makes = placing.choose([(openwork.thin_pole, 3), (openwork.bollard, 2)], 40, generator)
+        mixed, places = placing.shuffled(makes, generator), along(*CITY_SIGHT, (1, 7), generator)
         for make, x in zip(mixed, places, strict=False):
-            yield from place(make(generator), x, kerb + side * 0.35)
+            yield from placing.place(make(generator), x, kerb + side * 0.35)
         if generator.random() < 0.4:
             begin = generator.uniform(2, 20)
             rail = openwork.railing(generator.uniform(3, 12), generator)
@@ -135,7 +124,7 @@ def _works(section: Section, generator: Generator) -> Iterator[Surface]:
         side = int(generator.integers(2))
         length, x = generator.uniform(6, 15), generator.uniform(-5, 25)
         y = section.fronts[side] - (1.4 if side else -0.2)
-        yield from place(openwork.scaffold(length, generator), x, y)
+        yield from placing.place(openwork.scaffold(length, generator), x, y)
         if generator.random() < 0.7:
             veil = openwork.net(length, generator.uniform(3, 6), generator)
             yield veil.placed(x, y - 0.15 if side else y + 1.3)

@@ -10,8 +10,7 @@ from numpy.random import Generator
 from derain.simulation.arrays import Floats, Ints
 from derain.simulation.drawing import along
 from derain.simulation.objects import Surface
-from derain.simulation.places import ground, openwork, plants
-from derain.simulation.places.placing import Line, assemble, line_up, place, ragged_things, users
+from derain.simulation.places import ground, openwork, placing, plants
 from derain.simulation.track import Track
 
 # How far what is beside the road goes on behind the sensor and ahead of it, metres.
@@ -32,7 +31,7 @@ class Road:
     bend: float
     half_width: float
 
-    def beside(self, side: int, outwards: float) -> Line:
+    def beside(self, side: int, outwards: float) -> placing.Line:
         """The line so many metres outwards from its left (1) or right edge."""
         return lambda x: self.aside + self.bend * x**2 + side * (self.half_width + outwards)
 
@@ -59,15 +58,15 @@ def lay_out_country(generator: Generator) -> Track:
     winter = generator.random() < 0.4
     snowy = winter and generator.random() < 0.5
     standing = [
-        *users(generator, walkers=(4, 12), cars=(2, 6)),
+        *placing.users(generator, walkers=(4, 12), cars=(2, 6)),
         *_verges(road, generator),
         *(thing for side in (-1, 1) for thing in _boundary(road, side, winter, snowy, generator)),
         *_trees(road, winter, generator),
         *_cables(road, generator),
-        *ragged_things(generator, road.beside_it, count=(10, 30), leafy=not winter),
+        *placing.ragged_things(generator, road.beside_it, count=(10, 30), leafy=not winter),
     ]
     uneven = ground.Relief.draw(generator.uniform(0.05, 0.5), generator)
-    return assemble(_ground(road, snowy, generator), standing, uneven, generator)
+    return placing.assemble(_ground(road, snowy, generator), standing, uneven, generator)
 
 
 def _ground(road: Road, snowy: bool, generator: Generator) -> Iterator[Surface]:
@@ -110,13 +109,13 @@ def _boundary(
         "gate": openwork.railing,
     }
     make = makes[generator.choice(list(makes), p=[0.35, 0.2, 0.15, 0.15, 0.05, 0.1])]
-    return line_up(make, line, COUNTRY_SIGHT, generator.uniform(4, 9), generator, gaps)
+    return placing.line_up(make, line, COUNTRY_SIGHT, generator.uniform(4, 9), generator, gaps)
 
 
 def _bare_hedge(length: float, generator: Generator) -> Iterator[Surface]:
     height = generator.uniform(0.8, 2.5)
     for x in np.arange(0, length, 0.6):
-        yield from place(plants.brushwood(height, generator), x, 0)
+        yield from placing.place(plants.brushwood(height, generator), x, 0)
 
 
 def _trees(road: Road, winter: bool, generator: Generator) -> Iterator[Surface]:
@@ -124,7 +123,7 @@ def _trees(road: Road, winter: bool, generator: Generator) -> Iterator[Surface]:
         line, spacing = road.beside(side, generator.uniform(1.5, 10)), generator.uniform(6, 25)
         for x in along(*COUNTRY_SIGHT, (0.5 * spacing, spacing), generator):
             y = float(line(np.array(x))) + side * generator.uniform(0, 3)
-            yield from place(plants.tree(winter, generator), x, y, generator.uniform(0, 6))
+            yield from placing.place(plants.tree(winter, generator), x, y, generator.uniform(0, 6))
 
 
 def _cables(road: Road, generator: Generator) -> Iterator[Surface]:

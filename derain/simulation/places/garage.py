@@ -9,16 +9,7 @@ from numpy.random import Generator
 from derain.simulation import shapes
 from derain.simulation.drawing import log_uniform
 from derain.simulation.objects import Make, Options, Piece, Surface, of_size
-from derain.simulation.places import ground, openwork, plants, road_users, walls
-from derain.simulation.places.placing import (
-    assemble,
-    choose,
-    free_places,
-    line_up,
-    place,
-    scatter,
-    shuffled,
-)
+from derain.simulation.places import ground, openwork, placing, plants, road_users, walls
 from derain.simulation.places.walls import Walls
 from derain.simulation.track import Track
 
@@ -52,7 +43,7 @@ def lay_out_garage(generator: Generator) -> Track:
         [ground.CONCRETE], lambda x, y: np.zeros(np.shape(x), np.int64), generator
     )
     uneven = ground.Relief.draw(generator.uniform(0.003, 0.03), generator)
-    return assemble(floor, standing, uneven, generator, [_ceiling(hall, generator)])
+    return placing.assemble(floor, standing, uneven, generator, [_ceiling(hall, generator)])
 
 
 def _ceiling(hall: Walls, generator: Generator) -> Surface:
@@ -108,7 +99,7 @@ def _walls(hall: Walls, generator: Generator) -> Iterator[Surface]:
             wall.append(openwork.railing(length, generator))
             outside = plants.bush((0.5 * length, 1.5, 2.0), generator)
             wall.append(outside.placed(length / 2, -generator.uniform(3, 8)))
-        yield from place(wall, x, y, number * np.pi / 2)
+        yield from placing.place(wall, x, y, number * np.pi / 2)
 
 
 def _parked(hall: Walls, generator: Generator) -> Iterator[Surface]:
@@ -117,7 +108,7 @@ def _parked(hall: Walls, generator: Generator) -> Iterator[Surface]:
         for x in np.arange(hall.x[0] + 2, hall.x[1] - 2, 2.7):
             if generator.random() < full and np.hypot(x, y) > 4.3:
                 heading = nose * np.pi / 2 + generator.normal(0, 0.04)
-                yield from place(road_users.glazed_car(generator), x, y, heading)
+                yield from placing.place(road_users.glazed_car(generator), x, y, heading)
 
 
 def _about(hall: Walls, generator: Generator) -> Iterator[Surface]:
@@ -132,9 +123,9 @@ def _about(hall: Walls, generator: Generator) -> Iterator[Surface]:
         (ground.logs, 0.4),
         (of_size(ground.rubble, (0.3, 1)), 1),
     ]
-    makes += choose(small, (5, 20), generator)
-    places = free_places(len(makes), (2.2, 30), 0.9, generator, hall.holds)
-    yield from scatter(shuffled(makes, generator), places, generator)
+    makes += placing.choose(small, (5, 20), generator)
+    places = placing.free_places(len(makes), (2.2, 30), 0.9, generator, hall.holds)
+    yield from placing.scatter(placing.shuffled(makes, generator), places, generator)
 
 
 def _cages(hall: Walls, generator: Generator) -> Iterator[Surface]:
@@ -145,8 +136,10 @@ def _cages(hall: Walls, generator: Generator) -> Iterator[Surface]:
         lambda length, drawn: openwork.net(length, hall.height - 0.1, drawn),
         openwork.scaffold,
     ]
-    for x, y in free_places(int(generator.integers(2, 6)), (2.5, 20), 2.5, generator, hall.holds):
+    for x, y in placing.free_places(
+        int(generator.integers(2, 6)), (2.5, 20), 2.5, generator, hall.holds
+    ):
         make = kinds[generator.integers(len(kinds))]
         reach = min(generator.uniform(1.5, 7), hall.x[1] - x)
-        pieces = line_up(make, 0, (0, reach + 0.1), reach, generator)
-        yield from place(pieces, x, y)
+        pieces = placing.line_up(make, 0, (0, reach + 0.1), reach, generator)
+        yield from placing.place(pieces, x, y)

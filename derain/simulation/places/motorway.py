@@ -8,15 +8,7 @@ from numpy.random import Generator
 from derain.simulation import objects, shapes
 from derain.simulation.drawing import along
 from derain.simulation.objects import Make, Piece, Surface
-from derain.simulation.places import ground, openwork, plants, road_users, walls
-from derain.simulation.places.placing import (
-    assemble,
-    free_places,
-    line_up,
-    place,
-    ragged_things,
-    scatter,
-)
+from derain.simulation.places import ground, openwork, placing, plants, road_users, walls
 from derain.simulation.track import Track
 
 MOTORWAY_SIGHT = (-80.0, 115.0)
@@ -41,11 +33,13 @@ def lay_out_motorway(generator: Generator) -> Track:
         *_breakdown(right, generator),
         *_beside((right, other), generator),
         *_embankments((right - 3, other + 3), generator),
-        *ragged_things(generator, lambda x, y: not right - 1 < y < other + 1.5, count=(5, 15)),
+        *placing.ragged_things(
+            generator, lambda x, y: not right - 1 < y < other + 1.5, count=(5, 15)
+        ),
     ]
     uneven = ground.Relief.draw(generator.uniform(0.02, 0.15), generator)
     over = _gantries((right - 1, other + 1), generator)
-    return assemble(_ground(right, other, generator), standing, uneven, generator, over)
+    return placing.assemble(_ground(right, other, generator), standing, uneven, generator, over)
 
 
 def _ground(right: float, left: float, generator: Generator) -> Iterator[Surface]:
@@ -58,7 +52,7 @@ def _ground(right: float, left: float, generator: Generator) -> Iterator[Surface
 def _rails(lines: tuple[float, ...], generator: Generator) -> Iterator[Surface]:
     for y in lines:
         make = openwork.guard_rail if generator.random() < 0.7 else openwork.wire_fence
-        yield from line_up(make, y, MOTORWAY_SIGHT, 16, generator, gaps=0.05)
+        yield from placing.line_up(make, y, MOTORWAY_SIGHT, 16, generator, gaps=0.05)
 
 
 def _driving(lanes: int, own: int, median: float, generator: Generator) -> Iterator[Surface]:
@@ -73,7 +67,7 @@ def _driving(lanes: int, own: int, median: float, generator: Generator) -> Itera
             car = road_users.glazed_car if abs(x) < 35 else objects.car
             make: Make = road_users.lorry if generator.random() < 0.15 + 0.45 * slow else car
             heading = 0 if own_carriageway else np.pi
-            yield from place(make(generator), x, y + generator.normal(0, 0.2), heading)
+            yield from placing.place(make(generator), x, y + generator.normal(0, 0.2), heading)
 
 
 def _breakdown(right: float, generator: Generator) -> Iterator[Surface]:
@@ -85,8 +79,8 @@ def _breakdown(right: float, generator: Generator) -> Iterator[Surface]:
     makes = [road_users.person] * generator.integers(2, 8) + [
         openwork.bollard
     ] * generator.integers(0, 8)
-    places = free_places(len(makes), (2.3, 60), 1.2, generator, on_the_shoulder)
-    yield from scatter(makes, places, generator)
+    places = placing.free_places(len(makes), (2.3, 60), 1.2, generator, on_the_shoulder)
+    yield from placing.scatter(makes, places, generator)
 
 
 def _beside(edges: tuple[float, float], generator: Generator) -> Iterator[Surface]:
@@ -97,9 +91,11 @@ def _beside(edges: tuple[float, float], generator: Generator) -> Iterator[Surfac
         yield plants.grass(np.column_stack([ahead, y + side * (out - 1)]), generator)
         for x in along(-30, 50, (5, 40), generator):
             litter = ground.rubble(generator.uniform(0.3, 1), generator)
-            yield from place(litter, x, y + side * generator.uniform(-1.5, 0.5))
+            yield from placing.place(litter, x, y + side * generator.uniform(-1.5, 0.5))
         for x in along(*MOTORWAY_SIGHT, (4, 25), generator):
-            yield from place(openwork.thin_pole(generator), x, y + side * generator.uniform(0.8, 3))
+            yield from placing.place(
+                openwork.thin_pole(generator), x, y + side * generator.uniform(0.8, 3)
+            )
 
 
 def _gantries(edges: tuple[float, float], generator: Generator) -> Iterator[Surface]:
@@ -126,13 +122,13 @@ def _embankments(edges: tuple[float, float], generator: Generator) -> Iterator[S
         make, out, piece, gaps = EMBANKMENTS[generator.integers(len(EMBANKMENTS))]
         away = y + side * generator.uniform(0.5, 4)
         line = away + out * side
-        yield from line_up(make, line, MOTORWAY_SIGHT, piece, generator, gaps)
+        yield from placing.line_up(make, line, MOTORWAY_SIGHT, piece, generator, gaps)
         for x in along(*MOTORWAY_SIGHT, (5, 18), generator):
             y = away + side * generator.uniform(1, 12)
-            yield from place(plants.tree(generator.random() < 0.4, generator), x, y)
+            yield from placing.place(plants.tree(generator.random() < 0.4, generator), x, y)
         for x in along(*MOTORWAY_SIGHT, (2, 12), generator):
             scrub = plants.brushwood(generator.uniform(0.5, 2.5), generator)
-            yield from place(scrub, x, away + side * generator.uniform(0.5, 6))
+            yield from placing.place(scrub, x, away + side * generator.uniform(0.5, 6))
 
 
 def _noise_wall(length: float, generator: Generator) -> Iterator[Surface]:

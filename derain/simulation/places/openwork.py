@@ -203,3 +203,36 @@ def _ribbons(starts: Floats, ends: Floats, width: float) -> Triangles:
 
 def _strung(triangles: Triangles, generator: Generator) -> Surface:
     return of_material([triangles], THREAD_REFLECTIVITY, generator)
+
+
+GLASS_CELL = 0.04
+MOST_CELLS = 900
+
+# Share of a pane that returns a ray: of clean glass, and of a dirty or frosted pane.
+RETURNING = (0.005, 0.6)
+
+
+def pane(corners: Floats, generator: Generator) -> Triangles:
+    """A pane of glass.
+
+    Args:
+        corners: Its four corners in order, (4, 3), metres.
+        generator: Random generator.
+    """
+    sides = np.linalg.norm(corners[[1, 3]] - corners[0], axis=1)
+    cell = max(GLASS_CELL, float(np.sqrt(sides.prod() / MOST_CELLS)))
+    wide, high = (1 + int(side / cell) for side in sides)
+    share = log_uniform(RETURNING, generator)
+    # A pane is never nothing at all.
+    there = generator.permutation(wide * high)[: 1 + generator.binomial(wide * high - 1, share)]
+    column, row = there % wide, there // wide
+    u, v = ((edge / count)[:, None] for edge, count in ((column, wide), (row, high)))
+    ends = (0, 0), (1, 0), (1, 1), (0, 1)
+    return shapes.quads(*(_between(corners, u + i / wide, v + j / high) for i, j in ends))
+
+
+def _between(corners: Floats, u: Floats, v: Floats) -> Floats:
+    """Places by their shares of the way from the first corner to the second and to the fourth."""
+    first, second, third, fourth = corners
+    lower, upper = (1 - u) * first + u * second, (1 - u) * fourth + u * third
+    return np.asarray((1 - v) * lower + v * upper)

@@ -10,7 +10,7 @@ from derain.simulation.arrays import Floats
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import log_uniform
 from derain.simulation.objects import Surface, of_material
-from derain.simulation.places.walls import pane
+from derain.simulation.places.openwork import pane
 from derain.simulation.shapes import Point, Triangles, bars
 
 # Of cloth, which in the near infrared is anything from black to white.

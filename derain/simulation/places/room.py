@@ -11,9 +11,8 @@ from derain.simulation.arrays import Bools
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import log_uniform
 from derain.simulation.objects import Make, Options, Surface, mirrored, of_size
-from derain.simulation.places import openwork, plants, road_users
+from derain.simulation.places import openwork, placing, plants, road_users
 from derain.simulation.places.openwork import made, railing
-from derain.simulation.places.placing import choose, free_places, place, scatter
 from derain.simulation.places.walls import Walls, shell
 from derain.simulation.shapes import Point, Triangles, bars
 from derain.simulation.track import Track
@@ -120,16 +119,16 @@ def _furniture(room: Walls, generator: Generator) -> Iterator[Surface]:
     ]
     area = (room.x[1] - room.x[0]) * (room.y[1] - room.y[0])
     count = int(np.clip(area * log_uniform((0.08, 0.6), generator), 3, 40))
-    makes = choose(options, count, generator)
-    places = free_places(count, (0.7, 15.0), 0.6, generator, room.holds)
-    yield from scatter(makes, places, generator)
+    makes = placing.choose(options, count, generator)
+    places = placing.free_places(count, (0.7, 15.0), 0.6, generator, room.holds)
+    yield from placing.scatter(makes, places, generator)
 
 
 def _people(room: Walls, most: int, generator: Generator) -> Iterator[Surface]:
     """Somebody at an arm's length or at the other end of the room."""
     count = int(generator.integers(0, most))
-    places = free_places(count, (0.6, 8.0), 0.5, generator, room.holds)
-    yield from scatter([road_users.person] * count, places, generator)
+    places = placing.free_places(count, (0.6, 8.0), 0.5, generator, room.holds)
+    yield from placing.scatter([road_users.person] * count, places, generator)
 
 
 def _twigs(generator: Generator) -> Surface:
@@ -148,11 +147,13 @@ def _along_a_corridor(room: Walls, generator: Generator) -> Iterator[Surface]:
         door = shapes.box(0.9, 0.04, 0.01, 2.0, at=(0.45, 0), heading=ajar)
         handle = shapes.box(0.12, 0.03, 1.0, 1.03, at=(0.8, 0.06))
         x, y, heading = (at, side, 0.0) if lengthwise else (side, at, np.pi / 2)
-        yield from place(made([door, handle], generator), x, y, heading)
+        yield from placing.place(made([door, handle], generator), x, y, heading)
     makes: list[Make] = [chair, rubbish, pot_plant, shelf]
     count = int(generator.integers(0, 8))
-    chosen = choose([(make, 1) for make in makes], count, generator)
-    yield from scatter(chosen, free_places(count, (0.8, 20), 1, generator, room.holds), generator)
+    chosen = placing.choose([(make, 1) for make in makes], count, generator)
+    yield from placing.scatter(
+        chosen, placing.free_places(count, (0.8, 20), 1, generator, room.holds), generator
+    )
 
 
 def _stairs(room: Walls, generator: Generator) -> Iterator[Surface]:
@@ -171,7 +172,7 @@ def _stairs(room: Walls, generator: Generator) -> Iterator[Surface]:
             sloped = shapes.sloped(rail.moved(0, y, 0).triangles, rise / tread, 0)
             parts.append(replace(rail, triangles=shapes.raised(sloped, level + rise)))
         turned = -6 * tread if heading else 0.8
-        yield from place(parts, turned * np.cos(heading), 0.6 * np.sign(heading), heading)
+        yield from placing.place(parts, turned * np.cos(heading), 0.6 * np.sign(heading), heading)
 
 
 def table(generator: Generator) -> Iterator[Surface]:

@@ -8,46 +8,12 @@ import numpy as np
 from numpy.random import Generator
 
 from derain.simulation import shapes
-from derain.simulation.arrays import Floats
 from derain.simulation.drawing import Span, log_uniform
 from derain.simulation.objects import Surface, of_material, spotted
 from derain.simulation.places import openwork
 from derain.simulation.places.openwork import cable, made, railing
 from derain.simulation.places.placing import place
-from derain.simulation.shapes import Point, Triangles, bars
-
-GLASS_CELL = 0.04
-MOST_CELLS = 900
-
-# Share of a pane that returns a ray: of clean glass, and of a dirty or frosted pane.
-RETURNING = (0.005, 0.6)
-
-
-def pane(corners: Floats, generator: Generator) -> Triangles:
-    """A pane of glass.
-
-    Args:
-        corners: Its four corners in order, (4, 3), metres.
-        generator: Random generator.
-    """
-    sides = np.linalg.norm(corners[[1, 3]] - corners[0], axis=1)
-    cell = max(GLASS_CELL, float(np.sqrt(sides.prod() / MOST_CELLS)))
-    wide, high = (1 + int(side / cell) for side in sides)
-    share = log_uniform(RETURNING, generator)
-    # A pane is never nothing at all.
-    there = generator.permutation(wide * high)[: 1 + generator.binomial(wide * high - 1, share)]
-    column, row = there % wide, there // wide
-    u, v = ((edge / count)[:, None] for edge, count in ((column, wide), (row, high)))
-    ends = (0, 0), (1, 0), (1, 1), (0, 1)
-    return shapes.quads(*(_between(corners, u + i / wide, v + j / high) for i, j in ends))
-
-
-def _between(corners: Floats, u: Floats, v: Floats) -> Floats:
-    """Places by their shares of the way from the first corner to the second and to the fourth."""
-    first, second, third, fourth = corners
-    lower, upper = (1 - u) * first + u * second, (1 - u) * fourth + u * third
-    return np.asarray((1 - v) * lower + v * upper)
-
+from derain.simulation.shapes import Point, bars
 
 STONE = (0.08, 0.7)
 GLASS = (0.01, 0.2)
@@ -107,7 +73,7 @@ def facade(length: float, generator: Generator) -> Iterator[Surface]:
         x, z = bay * (column + 0.5), storey * level + sill
         left, right, top = x - wide / 2, x + wide / 2, z + high
         square = [(left, recess, z), (right, recess, z), (right, recess, top), (left, recess, top)]
-        panes.append(pane(np.array(square), generator))
+        panes.append(openwork.pane(np.array(square), generator))
         frames += list(zip(square, square[1:] + square[:1], strict=True))
         frames += [((x, recess, z), (x, recess, top)), ((left, -0.05, z), (right, -0.05, z))]
     yield of_material(panes, GLASS, generator)
@@ -254,7 +220,7 @@ def _panes(
     x = np.linspace((length - wide) / 2, (length + wide) / 2, 2 + int(wide / 1.4))
     for left, right in pairwise(x):
         corners = np.array([(left, 0, low), (right, 0, low), (right, 0, high), (left, 0, high)])
-        yield made([pane(corners, generator)], generator)
+        yield made([openwork.pane(corners, generator)], generator)
         yield made([bars([((left, 0, low), (left, 0, high))], 0.03)], generator)
         if generator.random() < 0.2:
             slats = np.arange(low + generator.uniform(0, high - low - 0.2), high, 0.06)

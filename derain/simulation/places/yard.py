@@ -7,18 +7,7 @@ from numpy.random import Generator
 
 from derain.simulation.arrays import Floats, Ints
 from derain.simulation.objects import Piece, Surface, of_size
-from derain.simulation.places import ground, openwork, plants, walls
-from derain.simulation.places.placing import (
-    CLEARANCE,
-    assemble,
-    free_places,
-    line_up,
-    place,
-    ragged_things,
-    scatter,
-    shuffled,
-    users,
-)
+from derain.simulation.places import ground, openwork, placing, plants, walls
 from derain.simulation.track import Track
 
 
@@ -31,14 +20,16 @@ def lay_out_yard(generator: Generator) -> Track:
     """
     winter = generator.random() < 0.4
     standing = [
-        *users(generator, walkers=(5, 14), cars=(1, 6)),
+        *placing.users(generator, walkers=(5, 14), cars=(1, 6)),
         *_heaps(winter, generator),
         *_lines(winter, generator),
         *_grass(generator),
-        *ragged_things(generator, count=(25, 60), leafy=not winter),
+        *placing.ragged_things(generator, count=(25, 60), leafy=not winter),
     ]
     uneven = ground.Relief.draw(generator.uniform(0.05, 0.4), generator)
-    return assemble(_ground(winter, generator), standing, uneven, generator, _cables(generator))
+    return placing.assemble(
+        _ground(winter, generator), standing, uneven, generator, _cables(generator)
+    )
 
 
 def _ground(winter: bool, generator: Generator) -> Iterator[Surface]:
@@ -58,8 +49,8 @@ def _heaps(winter: bool, generator: Generator) -> Iterator[Surface]:
         return ground.bank(length, generator, snow=winter and generator.random() < 0.7)
 
     makes = [mound] * 4 + [of_size(ground.rubble, (0.5, 2.5))] * 6 + [ground.logs] * 3
-    places = free_places(int(generator.integers(4, 14)), (4, 40), 3, generator)
-    yield from scatter(shuffled(makes, generator), places, generator)
+    places = placing.free_places(int(generator.integers(4, 14)), (4, 40), 3, generator)
+    yield from placing.scatter(placing.shuffled(makes, generator), places, generator)
 
 
 def _lines(winter: bool, generator: Generator) -> Iterator[Surface]:
@@ -73,20 +64,20 @@ def _lines(winter: bool, generator: Generator) -> Iterator[Surface]:
         lambda length, generator: walls.rough_wall(length, generator.uniform(0.5, 4), generator),
     ]
     kinds.append(openwork.chain_link if winter else plants.hedge)
-    for x, y in free_places(int(generator.integers(4, 10)), (5, 45), 4, generator):
+    for x, y in placing.free_places(int(generator.integers(4, 10)), (5, 45), 4, generator):
         make = kinds[generator.integers(len(kinds))]
         piece = generator.uniform(4, 9)
         reach = (0.0, piece * generator.integers(1, 4) + 0.1)
-        line = line_up(make, 0, reach, piece, generator, 0.1)
+        line = placing.line_up(make, 0, reach, piece, generator, 0.1)
         # Across the way from the sensor to its beginning, so that it does not lead to the sensor.
         across = np.arctan2(y, x) + np.pi / 2 + generator.normal(0, 0.5)
-        yield from place(line, x, y, across)
+        yield from placing.place(line, x, y, across)
 
 
 def _grass(generator: Generator) -> Iterator[Surface]:
     for _ in range(generator.integers(1, 4)):
         count = int(generator.integers(100, 900))
-        distance = CLEARANCE + generator.exponential(generator.uniform(3, 9), count)
+        distance = placing.CLEARANCE + generator.exponential(generator.uniform(3, 9), count)
         angle = generator.uniform(0, 2 * np.pi, count)
         places = distance[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
         yield plants.grass(places, generator)

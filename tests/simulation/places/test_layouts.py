@@ -11,7 +11,7 @@ from derain.simulation.arrays import Floats, Ints
 from derain.simulation.classes import TrackClass
 from derain.simulation.layouts import LAYOUTS
 from derain.simulation.places.horizon import lay_out_horizon
-from derain.simulation.places.walls import RETURNING, pane
+from derain.simulation.places.openwork import RETURNING, pane
 from derain.simulation.sensor import Sensor
 from derain.simulation.shapes import nearest_to_axis
 from derain.simulation.track import Track
