@@ -147,7 +147,11 @@ class SequenceWork(Work[Unit, Outcome]):
         if not folder.exists():
             with writing(self.root), temporary_folder(folder.parent) as temporary:
                 self.campaign.write(temporary / unit.id, unit.id)
-                self._put_in_place(temporary / unit.id, folder)
+                try:
+                    (temporary / unit.id).rename(folder)
+                except OSError:
+                    if not folder.is_dir():  # else another process was quicker, with the same bytes
+                        raise
         yield checksums(folder, self.root)
 
     def is_there(self, unit: Unit) -> bool:
@@ -169,14 +173,6 @@ class SequenceWork(Work[Unit, Outcome]):
     def from_json(self, unit: Unit, written: Any) -> Outcome:
         """The checksums, as they are."""
         return dict(written)
-
-    @staticmethod
-    def _put_in_place(complete: Path, folder: Path) -> None:
-        try:
-            complete.rename(folder)
-        except OSError:
-            if not folder.is_dir():  # else another process was quicker, with the same bytes
-                raise
 
 
 def _remove(root: Path) -> None:

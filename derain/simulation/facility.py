@@ -36,7 +36,7 @@ def lay_out_track(generator: Generator) -> Track:
     surfaces = [
         *road_and_ground(half_width, generator),
         *_traffic(half_width, generator),
-        *_sprinklers(half_width, generator),
+        *objects.sprinklers(_masts(generator), half_width + 0.5, generator),
         *_verges(half_width, generator),
         *_boughs(half_width, generator),
         *_buildings(half_width, generator),
@@ -82,9 +82,8 @@ def _traffic(half_width: float, generator: Generator) -> Iterator[Surface]:
         yield kind(generator).placed(x, generator.uniform(1 - half_width, half_width - 1))
 
 
-def _sprinklers(half_width: float, generator: Generator) -> Iterator[Surface]:
-    x = np.arange(generator.uniform(6, 12), 60, generator.uniform(6, 10))
-    return objects.sprinklers(x, half_width + 0.5, generator)
+def _masts(generator: Generator) -> Floats:
+    return np.arange(generator.uniform(6, 12), 60, generator.uniform(6, 10))
 
 
 def _verges(half_width: float, generator: Generator) -> Iterator[Surface]:

@@ -16,6 +16,8 @@ from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import Span, log_uniform, log_uniforms
 from derain.simulation.shapes import Triangles
 
+BACKGROUND = TrackClass.BACKGROUND
+
 
 @dataclass(frozen=True, eq=False)
 class Surface:
@@ -61,7 +63,7 @@ def of_material(
     parts: Sequence[Triangles],
     reflectivity: Span,
     generator: Generator,
-    label: TrackClass = TrackClass.BACKGROUND,
+    label: TrackClass = BACKGROUND,
 ) -> Surface:
     """Parts as one surface, its reflectivity log-uniform between two values."""
     return Surface(np.concatenate(parts), label, log_uniform(reflectivity, generator))
@@ -80,7 +82,7 @@ def spotted(
     """
     usual = log_uniform(reflectivity, generator)
     spots = usual * np.exp(generator.normal(0, spread, len(triangles)))
-    return Surface(triangles, TrackClass.BACKGROUND, np.clip(spots, 0.003, 1))
+    return Surface(triangles, BACKGROUND, np.clip(spots, 0.003, 1))
 
 
 def asphalt(x: tuple[float, float], y: tuple[float, float], generator: Generator) -> Surface:
@@ -91,7 +93,7 @@ def asphalt(x: tuple[float, float], y: tuple[float, float], generator: Generator
 def ground(x: tuple[float, float], y: tuple[float, float], generator: Generator) -> Surface:
     """The ground under and beside the road, a centimetre lower so that the road is on top."""
     plane = shapes.rectangle(x, y, -0.01)
-    return Surface(plane, TrackClass.BACKGROUND, generator.uniform(0.05, 0.3))
+    return Surface(plane, BACKGROUND, generator.uniform(0.05, 0.3))
 
 
 def car(generator: Generator) -> Surface:
@@ -154,13 +156,13 @@ def sprinklers(places: Floats, aside: float, generator: Generator) -> Iterator[S
 def pole(generator: Generator) -> Surface:
     """A thin post: of a fence, a sign or a lamp."""
     post = shapes.cylinder(generator.uniform(0.01, 0.06), 0, generator.uniform(0.8, 6.0))
-    return Surface(post, TrackClass.BACKGROUND, generator.uniform(0.02, 0.5))
+    return Surface(post, BACKGROUND, generator.uniform(0.02, 0.5))
 
 
 def trunk(generator: Generator) -> Surface:
     """The trunk of a tree."""
     stem = shapes.cylinder(generator.uniform(0.08, 0.25), 0, 3)
-    return Surface(stem, TrackClass.BACKGROUND, generator.uniform(0.05, 0.3))
+    return Surface(stem, BACKGROUND, generator.uniform(0.05, 0.3))
 
 
 def tree(crown: float, generator: Generator) -> Iterator[Surface]:
@@ -184,7 +186,7 @@ def building(generator: Generator) -> Surface:
     """A flat-roofed building."""
     length, width = generator.uniform(5, 15), generator.uniform(10, 40)
     walls = shapes.box(length, width, 0, generator.uniform(3, 9))
-    return Surface(walls, TrackClass.BACKGROUND, generator.uniform(0.1, 0.6))
+    return Surface(walls, BACKGROUND, generator.uniform(0.1, 0.6))
 
 
 def foliage(radii: tuple[float, float, float], height: float, generator: Generator) -> Surface:
@@ -202,7 +204,7 @@ def foliage(radii: tuple[float, float, float], height: float, generator: Generat
     count = int(generator.uniform(30, 250) * surface_area)
     leaves = shapes.leaves(shapes.inside_ellipsoid(count, radii, generator), 0.02, generator)
     reflectivity = log_uniforms((0.003, 0.4), count, generator)
-    return Surface(shapes.raised(leaves, height), TrackClass.BACKGROUND, reflectivity)
+    return Surface(shapes.raised(leaves, height), BACKGROUND, reflectivity)
 
 
 # Of what returns, and of what reflects so little towards the sensor that no detector sees it.

@@ -1,6 +1,6 @@
 """Beams on their way through all that flies: what they meet, and what the sensor reports."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -166,10 +166,13 @@ def meet(
     met = Encounters.joined(
         population.met_by(open_beams, weather.flicker, generator) for population in populations
     ).ordered()
+    reflectivity = met.reflectivity * np.exp(-2 * extinction * met.range)
+    particles = Returns(met.range, reflectivity, np.full_like(met.beam, TrackClass.RAIN), met.beam)
+    seen = particles.take(reflectivity >= sensor.detection_threshold * met.range**2)
     transmission = met.transmission(len(beams)) * np.exp(-2 * extinction * clear.range)
     candidates = [
         sensor.detected(clear, transmission),
-        _detected_particles(met, extinction, clear, weather, sensor, generator),
+        _jittered(seen, clear.range, weather.jitter, sensor, generator),
         draw_haze(clear, beams, weather, optics, generator),
     ]
     return sensor.reported(Returns.joined(candidates))
@@ -187,31 +190,27 @@ def uncrowded(weather: Precipitation, optics: Optics, sizes: Sizes) -> float:
     return min(weather.number, weather.crowding / met if met else weather.number)
 
 
-def _detected_particles(
-    met: Encounters,
-    extinction: float,
-    clear: Returns,
-    weather: Precipitation,
-    sensor: Sensor,
-    generator: Generator,
+def _jittered(
+    particles: Returns, reach: Floats, jitter: float, sensor: Sensor, generator: Generator
 ) -> Returns:
-    """Particles that the sensor would see if it reported all that a beam returns."""
-    reflectivity = met.reflectivity * np.exp(-2 * extinction * met.range)
-    needed = sensor.detection_threshold * met.range**2
-    seen = reflectivity >= needed
-    distance, beam = met.range[seen], met.beam[seen]
-    reflectivity, needed = reflectivity[seen], needed[seen]
-    spread = weather.jitter * np.sqrt(needed / reflectivity)
+    """Particles at distances that are off, by their power, as the sensor measures them.
+
+    Args:
+        particles: Those that the sensor would see if it reported all that a beam returns.
+        reach: Where each beam ends at a surface, float64 (N,), metres.
+        jitter: Standard deviation at the detection threshold, metres.
+        sensor: The sensor.
+        generator: Random generator.
+    """
+    distance = particles.range
+    needed = sensor.detection_threshold * distance**2
+    spread = jitter * np.sqrt(needed / particles.reflectivity)
     measured = distance + spread * generator.normal(size=len(distance))
     # Between the sensor's limits, and not behind the surface that ends the beam.
-    measured = np.maximum(np.minimum(measured, clear.range[beam]), sensor.minimum_range)
+    measured = np.maximum(np.minimum(measured, reach[particles.beam]), sensor.minimum_range)
     # The power is that of the true distance.
-    return Returns(
-        measured,
-        np.minimum(reflectivity * (measured / distance) ** 2, 1),
-        np.full(len(beam), int(TrackClass.RAIN)),
-        beam,
-    )
+    reflectivity = np.minimum(particles.reflectivity * (measured / distance) ** 2, 1)
+    return replace(particles, range=measured, reflectivity=reflectivity)
 
 
 def draw_haze(

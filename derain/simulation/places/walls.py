@@ -10,8 +10,7 @@ from numpy.random import Generator
 from derain.simulation import shapes
 from derain.simulation.drawing import Span, log_uniform
 from derain.simulation.objects import Surface, of_material, spotted
-from derain.simulation.places import openwork
-from derain.simulation.places.openwork import cable, made, railing
+from derain.simulation.places.openwork import cable, made, pane, railing
 from derain.simulation.places.placing import place
 from derain.simulation.shapes import Point, bars
 
@@ -73,7 +72,7 @@ def facade(length: float, generator: Generator) -> Iterator[Surface]:
         x, z = bay * (column + 0.5), storey * level + sill
         left, right, top = x - wide / 2, x + wide / 2, z + high
         square = [(left, recess, z), (right, recess, z), (right, recess, top), (left, recess, top)]
-        panes.append(openwork.pane(np.array(square), generator))
+        panes.append(pane(np.array(square), generator))
         frames += list(zip(square, square[1:] + square[:1], strict=True))
         frames += [((x, recess, z), (x, recess, top)), ((left, -0.05, z), (right, -0.05, z))]
     yield of_material(panes, GLASS, generator)
@@ -161,21 +160,12 @@ class Walls:
 
 def shell(room: Walls, generator: Generator) -> Iterator[Surface]:
     """Floor, ceiling and walls, closed but for windows and doorways."""
-    yield from _floor_and_ceiling(room, generator)
-    yield from _walls(room, generator)
-
-
-def _floor_and_ceiling(room: Walls, generator: Generator) -> Iterator[Surface]:
     length, width = room.x[1] - room.x[0], room.y[1] - room.y[0]
     for height, bumps in ((0.0, SMOOTH), (room.height, -SMOOTH)):
         rough = rough_wall(length + 2 * OVERLAP, width + 2 * OVERLAP, generator, cell=0.5)
         rough = rough.moved(-OVERLAP, 0, -OVERLAP)
         lying = laid_flat(rough, (room.x[0], room.y[0]), height, bumps)
         yield replace(lying, reflectivity=log_uniform(FLOOR, generator))
-
-
-def _walls(room: Walls, generator: Generator) -> Iterator[Surface]:
-    """Four walls, each whole, or with a band of glass or a doorway in it and a wall behind."""
     for number, (start, end) in enumerate(pairwise([*room.corners, room.corners[0]])):
         length = float(np.hypot(end[0] - start[0], end[1] - start[1]))
         kind = generator.choice(["whole", "glass", "doorway"], p=[0.5, 0.3, 0.2])
@@ -220,7 +210,7 @@ def _panes(
     x = np.linspace((length - wide) / 2, (length + wide) / 2, 2 + int(wide / 1.4))
     for left, right in pairwise(x):
         corners = np.array([(left, 0, low), (right, 0, low), (right, 0, high), (left, 0, high)])
-        yield made([openwork.pane(corners, generator)], generator)
+        yield made([pane(corners, generator)], generator)
         yield made([bars([((left, 0, low), (left, 0, high))], 0.03)], generator)
         if generator.random() < 0.2:
             slats = np.arange(low + generator.uniform(0, high - low - 0.2), high, 0.06)
@@ -244,4 +234,4 @@ def _on_the_wall(length: float, height: float, generator: Generator) -> Iterator
     for _ in range(generator.integers(0, 3)):
         along, up = generator.uniform(0, length, 2), generator.uniform(0.1, 2.2, 2)
         start, end = np.column_stack([along, (0.05, 0.05), up])
-        yield openwork.cable(start, end, generator.uniform(0, 0.3), (0.004, 0.02), generator)
+        yield cable(start, end, generator.uniform(0, 0.3), (0.004, 0.02), generator)
