@@ -21,8 +21,6 @@ from derain.simulation.drawn_sensor import (
 from derain.simulation.sensor import Sensor
 from derain.simulation.settings import LogSpan
 
-from .surfaces import surfaces
-
 SPANS = SensorSpans()
 
 
@@ -81,17 +79,6 @@ def test_defects_are_drawn_as_often_as_stated() -> None:
     copies = [draw_defects(spans, generator, dual=True).copies for _ in range(1000)]
     assert set(copies) == {0.0, 1.0}
     assert np.mean(copies) == pytest.approx(0.5, abs=0.07)
-
-
-def test_a_drawn_sensor_measures_finite_points(drawn: list[Sensor]) -> None:
-    for seed, sensor in enumerate(drawn[:12]):
-        beams = sensor.rows * sensor.columns
-        assert beams <= SPANS.most_beams
-        scan = sensor.measure(
-            surfaces(beams, sensor.minimum_range, 0.5), np.random.default_rng(seed)
-        )
-        assert np.isfinite(scan.xyz).all()
-        assert 0.5 * beams < len(scan) <= 2 * beams
 
 
 SEEDS = range(20)

@@ -7,11 +7,8 @@ import numpy as np
 import pytest
 
 from derain.errors import InputError
-from derain.simulation import shapes
 from derain.simulation.campaign import Campaign, Drive
 from derain.simulation.classes import TrackClass, unpacked
-from derain.simulation.objects import Surface
-from derain.simulation.rain_field import UniformRain
 from derain.simulation.scene import SimulatedScene
 from derain.simulation.sensor import Returns, Sensor
 from derain.simulation.street import SIGHT, STEP, Street, lay_out_street
@@ -128,22 +125,6 @@ def scene(campaign: Campaign) -> SimulatedScene:
 def points(returns: Returns, pose: np.ndarray) -> np.ndarray:
     """Where the beams end in the scene, float64 (N, 3)."""
     return (SENSOR.beams() * returns.range[:, None]) @ pose[:3, :3].T + pose[:3, 3]
-
-
-def test_walls_and_ground_stay_where_they_are_by_the_poses() -> None:
-    surfaces = [
-        Surface(shapes.box(1, 200, -1, 60, at=(50.5, 0)), TrackClass.TARGET, 0.5),
-        Surface(shapes.box(400, 1, -1, 60, at=(0, 8.5)), TrackClass.CAR, 0.5),
-        Surface(shapes.rectangle((-300, 300), (-300, 300), 0), TrackClass.ROAD, 0.5),
-    ]
-    course = Course.draw(13, np.random.default_rng(3))
-    walls = SimulatedScene(Track.of(surfaces), UniformRain(0), {}, course)
-    for time, returns in zip(SCAN_TIMES, walls.cast(SENSOR, SCAN_TIMES), strict=True):
-        ends = points(returns, course.pose(time, SENSOR))
-        for kind, axis, place in (("TARGET", 0, 50), ("CAR", 1, 8), ("ROAD", 2, 0)):
-            hit = returns.returned & (returns.label == TrackClass[kind])
-            assert hit.sum() > 100
-            assert np.allclose(ends[hit, axis], place, atol=2e-3)
 
 
 def test_what_moves_is_seen_as_if_it_were_built_into_the_street_with_its_number_on_it() -> None:

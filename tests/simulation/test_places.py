@@ -17,7 +17,7 @@ from derain.simulation.sensor import Sensor
 from derain.simulation.shapes import nearest_to_axis
 from derain.simulation.track import Track
 
-from .test_shapes import area
+from .test_track import area
 
 pytestmark = pytest.mark.usefixtures("open3d")
 

@@ -221,17 +221,6 @@ def test_clear_air_leaves_what_the_threshold_lets_through() -> None:
     assert (detected.label[visible] == clear.label[visible]).all()
 
 
-def test_it_rains_where_the_field_rains() -> None:
-    beams = Sensor(azimuth=(-180, 180), inclination=(-1, 1), rows=20, columns=2000).beams()
-    clear = open_air(len(beams))
-    detected = rain_on_beams(clear, beams, SprinkledRain(50), SENSOR, np.random.default_rng(12))
-    x, y, _ = (beams * detected.range[:, None])[detected.returned].T
-    assert len(x) > 1000
-    assert (np.abs(y) < 14).all()  # where the sprinklers throw no more
-    assert (x > -16).all()
-    assert np.count_nonzero(x > 8) > 50
-
-
 def random_beams(count: int, generator: Generator) -> Floats:
     beams = generator.normal(size=(count, 3))
     return beams / np.linalg.norm(beams, axis=1, keepdims=True)
