@@ -59,6 +59,7 @@ def weather_record(nominal: float, at_sensor: float, wind: Place) -> dict[str, f
         Values by names, in which the units are.
     """
     steepness = float(slope(nominal))
+    visibility = VISIBLE_OPTICAL_DEPTH / float(extinction(nominal)) if nominal else math.inf
     return {
         "rain_rate_mm_h": nominal,
         "rain_rate_at_sensor_mm_h": at_sensor,
@@ -67,7 +68,7 @@ def weather_record(nominal: float, at_sensor: float, wind: Place) -> dict[str, f
         "median_volume_diameter_mm": MEDIAN_VOLUME_DIAMETER / steepness,
         "wind_speed_m_s": math.hypot(*wind),
         "wind_direction_deg": math.degrees(math.atan2(wind[1], wind[0])),
-        "visibility_m": VISIBLE_OPTICAL_DEPTH / extinction(nominal) if nominal else math.inf,
+        "visibility_m": visibility,
     }
 
 
