@@ -33,7 +33,7 @@ def is_positive_span(span: Span) -> bool:
     return 0 < low <= high < math.inf
 
 
-# Types of settings that tell which of their values are possible.
+# Types of settings, each with the rule that its values follow.
 Share = Annotated[float, is_share]
 Positive = Annotated[float, is_positive]
 LogSpan = Annotated[Span, is_positive_span]

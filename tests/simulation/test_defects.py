@@ -63,7 +63,8 @@ def test_returns_are_lost_each_by_itself_and_rows_and_sectors_as_a_whole() -> No
         assert within(lost, 20 * parts, 0.1)
 
 
-def test_a_return_that_is_alone_is_copied_and_two_of_one_beam_are_not() -> None:
+def test_a_return_that_is_alone_is_copied_and_distances_go_to_the_nearest_step() -> None:
+    assert Defects(range_step=0.5).stepped(np.array([1.2, 1.3])).tolist() == [1.0, 1.5]
     beam = np.array([0, 1, 1, 2, 5, 5, 6])
     rows = Defects(copies=1.0).reported(beam, np.random.default_rng(0))
     assert rows.tolist() == [0, 0, 1, 2, 3, 3, 4, 5, 6, 6]

@@ -220,7 +220,7 @@ def draw_haze(
 
     The distance to the first of many weak scatterers in an even medium is exponential. Where there
     are patches, the share of a beam follows a smooth random field over the view, whose mean is the
-    share asked for. The power of a return over the threshold is log-uniform. All of it
+    stated share. The power of a return over the threshold is log-uniform. All of it
     is a modelling choice; what would lie behind the surface that ends the beam is left out.
 
     Args:
