@@ -12,8 +12,8 @@ from derain.cards.card import load_card
 from derain.files import write_scan
 from derain.files.labels import write_labels
 from derain.simulation.classes import unpacked
+from derain.simulation.drawn_sensor import SensorSpans
 from derain.simulation.flying.precipitation import KINDS, PrecipitationSpans
-from derain.simulation.spans import SensorSpans
 from derain.simulation.world import World, draw_scan
 
 # A sensor that looks ahead, of 64 rows of 330 steps.

@@ -16,7 +16,7 @@ from functools import partial
 import numpy as np
 from turns import milliseconds_in_turns
 
-from derain.simulation.layout import lay_out_track
+from derain.simulation.facility import lay_out_track
 from derain.simulation.rain import rain_on_beams
 from derain.simulation.rain_field import RainField, SprinkledRain, UniformRain
 from derain.simulation.sensor import load_sensor

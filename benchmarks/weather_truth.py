@@ -19,11 +19,11 @@ from tqdm import tqdm
 from derain.evaluation.text_tables import plain_table
 from derain.export.runtime import Derainer
 from derain.scan import Scan
+from derain.simulation.arrays import Returns
 from derain.simulation.classes import TrackClass
 from derain.simulation.layouts import LAYOUTS
 from derain.simulation.rain import rain_on_beams
 from derain.simulation.rain_field import UniformRain
-from derain.simulation.returns import Returns
 from derain.simulation.sensor import Sensor, load_sensor
 from derain.weather.scan_weather import ScanWeather
 from derain.weather.visibility import visibility_of

@@ -8,7 +8,7 @@ from derain.datamodules.sequences import SequenceDataModule
 from derain.errors import InputError
 from derain.jobs.workers import processes
 from derain.simulation.campaign import Campaign
-from derain.simulation.dataset import ensure_track
+from derain.simulation.dataset import simulate_track
 from derain.simulation.manifest import read_manifest
 from derain.simulation.world import WorldCampaign
 from derain.system.cores import usable_cores
@@ -59,7 +59,7 @@ class SimulatedDataModule(SequenceDataModule):
         """
         if self.make:
             with processes(self.workers) as executor:
-                ensure_track(self.root, self.campaign, executor)
+                simulate_track(self.root, self.campaign, executor, keep=False)
 
 
 class Simulated(SimulatedDataModule):

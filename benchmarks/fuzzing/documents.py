@@ -23,12 +23,11 @@ from derain.files.documents import Entry
 from derain.files.extrinsics import read_extrinsics
 from derain.files.frame_times import read_frame_times
 from derain.filters import FILTERS, FilterDerainer, filter_from
+from derain.simulation.arrays import Returns
 from derain.simulation.campaign import Campaign
-from derain.simulation.drawn_sensor import draw_sensor
+from derain.simulation.drawn_sensor import SensorSpans, draw_sensor
 from derain.simulation.manifest import MANIFEST, rates_of_sequences, read_manifest
-from derain.simulation.returns import Returns
 from derain.simulation.sensor import Sensor, load_sensor, packaged_sensors
-from derain.simulation.spans import SensorSpans
 
 SCENE = """
 height: 0.1

@@ -44,28 +44,13 @@ SEQUENCES = "sequences"
 Outcome = dict[str, str] | InputError
 
 
-def ensure_track(root: Path, campaign: SplitSequences, executor: Submits | None = None) -> None:
-    """Simulates a data set for a program's own use, unless the folder already holds this very one.
-
-    If the folder holds a data set that this function made of another campaign, it is replaced. One
-    that :func:`simulate_track` made is never replaced, because a person asked for it.
-
-    Args:
-        root: Folder of the data set.
-        campaign: What is to be in it.
-        executor: Simulates the sequences; None does it in this process.
-
-    Raises:
-        InputError: As :func:`simulate_track`.
-    """
-    _simulate(root, campaign, executor, None, keep=False)
-
-
 def simulate_track(
     root: Path,
     campaign: SplitSequences,
     executor: Submits | None = None,
     shard: Shard | None = None,
+    *,
+    keep: bool = True,
 ) -> bool:
     """Simulates a data set, or what is missing of it.
 
@@ -75,6 +60,8 @@ def simulate_track(
         executor: Simulates the sequences; None does it in this process.
         shard: The shard of the sequences that is simulated; None for all. Whoever does the last
             shard completes the manifest.
+        keep: Whether the data set is a person's. One that a program made for its own use, without
+            it, is replaced where the program simulates another campaign in the folder.
 
     Returns:
         Whether the data set is complete; False while other shards are to be simulated.
@@ -84,32 +71,13 @@ def simulate_track(
             or a sequence cannot be simulated. The others are simulated then, and nothing is
             half-written.
     """
-    return _simulate(root, campaign, executor, shard, keep=True)
-
-
-def _simulate(
-    root: Path,
-    campaign: SplitSequences,
-    executor: Submits | None,
-    shard: Shard | None,
-    *,
-    keep: bool,
-) -> bool:
-    """Simulates the sequences that are missing; see :func:`simulate_track`.
-
-    Args:
-        root: Folder of the data set.
-        campaign: What to simulate.
-        executor: Simulates the sequences.
-        shard: The shard that is simulated.
-        keep: Whether the data set is a person's; otherwise :func:`ensure_track` may replace it.
-    """
     campaign = campaign.resolved()  # reports a wrong file first
     description = {**campaign.description, "keep": keep}
     with _locked(root, shared=shard is not None):
-        if not keep:
-            _remove_another(root, campaign)
         there = read_manifest(root)
+        if not (keep or there.get("keep")) and there and not _describes(there, campaign):
+            _remove(root)
+            there = {}
         _refuse_others(root, there, campaign)
         if "files" in there and all((root / SEQUENCES / name).is_dir() for name in campaign.names):
             return True
@@ -179,7 +147,11 @@ class SequenceWork(Work[Unit, Outcome]):
         if not folder.exists():
             with writing(self.root), temporary_folder(folder.parent) as temporary:
                 self.campaign.write(temporary / unit.id, unit.id)
-                self._put_in_place(temporary / unit.id, folder)
+                try:
+                    (temporary / unit.id).rename(folder)
+                except OSError:
+                    if not folder.is_dir():  # else another process was quicker, with the same bytes
+                        raise
         yield checksums(folder, self.root)
 
     def is_there(self, unit: Unit) -> bool:
@@ -202,26 +174,16 @@ class SequenceWork(Work[Unit, Outcome]):
         """The checksums, as they are."""
         return dict(written)
 
-    @staticmethod
-    def _put_in_place(complete: Path, folder: Path) -> None:
-        try:
-            complete.rename(folder)
-        except OSError:
-            if not folder.is_dir():  # else another process was quicker, with the same bytes
-                raise
 
-
-def _remove_another(root: Path, campaign: SplitSequences) -> None:
-    """Removes the data set of another campaign, unless it is a person's."""
-    there = read_manifest(root)
-    if there and not there.get("keep") and not _describes(there, campaign):
-        with writing(root):
-            # The manifest goes last. Without it the folder would be taken for somebody else's,
-            # should this run be killed in between; the sequences may then be gone already.
-            for name in (SEQUENCES, FOLDER):
-                if (root / name).exists():
-                    shutil.rmtree(root / name)
-            (root / MANIFEST).unlink()
+def _remove(root: Path) -> None:
+    """Removes a data set."""
+    with writing(root):
+        # The manifest goes last. Without it the folder would be taken for somebody else's, should
+        # this run be killed in between; the sequences may then be gone already.
+        for name in (SEQUENCES, FOLDER):
+            if (root / name).exists():
+                shutil.rmtree(root / name)
+        (root / MANIFEST).unlink()
 
 
 @contextmanager

@@ -9,10 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.random import Generator
 
-from derain.simulation.arrays import Bools, Floats, Ints
+from derain.simulation.arrays import Bools, Floats, Ints, Returns
 from derain.simulation.classes import TrackClass, unpacked
-from derain.simulation.returns import Returns
-from derain.simulation.settings import Settings
+from derain.simulation.settings import Settings, Share
 
 # Parts of a scan that are lost together: sensors send a scan in 75 (Ouster) to 180 (Velodyne)
 # packets, of which a network drops some in a row.
@@ -27,7 +26,8 @@ class Defects(Settings):
     """What is wrong with the scans of a sensor; the default is nothing.
 
     Attributes:
-        dropped: Share of the returns that are lost, each by itself.
+        SUBJECT = "defects"
+    dropped: Share of the returns that are lost, each by itself.
         dropped_rows: Share of the rows of beams that are lost, anew in each scan.
         dropped_sectors: Share of the sectors, all columns sent in a sixtieth of a scan, that are
             lost, anew in each scan.
@@ -44,17 +44,14 @@ class Defects(Settings):
         InputError: A value that is impossible.
     """
 
-    dropped: float = 0.0
-    dropped_rows: float = 0.0
-    dropped_sectors: float = 0.0
-    mixed: float = 0.0
+    SUBJECT = "defects"
+    dropped: Share = 0.0
+    dropped_rows: Share = 0.0
+    dropped_sectors: Share = 0.0
+    mixed: Share = 0.0
     merging: float = 2.0
     range_step: float = 0.0
-    copies: float = 0.0
-
-    def __post_init__(self) -> None:
-        shares = ("dropped", "dropped_rows", "dropped_sectors", "mixed", "copies")
-        self._refuse_impossible("defects", {name: 0 <= getattr(self, name) <= 1 for name in shares})
+    copies: Share = 0.0
 
     def at_borders(
         self, returns: Returns, columns: int, *, dual: bool, generator: Generator

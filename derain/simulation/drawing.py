@@ -1,11 +1,14 @@
-"""Random numbers between two bounds, and names by their weights."""
+"""Random numbers between two bounds, places along a line, and things by their weights."""
 
 from collections.abc import Mapping
+from typing import TypeVar
 
 import numpy as np
 from numpy.random import Generator
 
 from derain.simulation.arrays import Floats
+
+T = TypeVar("T")
 
 # Least and greatest value.
 Span = tuple[float, float]
@@ -40,7 +43,7 @@ def along(begin: float, end: float, spacing: Span, generator: Generator) -> list
     return places
 
 
-def draw_name(weights: Mapping[str, float], generator: Generator) -> str:
-    """Draws a name by weights, which need not add up to 1."""
+def pick(weights: Mapping[T, float], generator: Generator) -> T:
+    """One of several things by their weights, which need not add up to 1."""
     share = np.array(list(weights.values())) / sum(weights.values())
-    return str(generator.choice(list(weights), p=share))
+    return list(weights)[generator.choice(len(weights), p=share)]

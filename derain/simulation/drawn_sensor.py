@@ -1,21 +1,168 @@
-"""Draws sensors, so that a network that learns from their scans has met any."""
+"""Draws sensors from spans, so that a network that learns from their scans has met any."""
 
 import math
-from dataclasses import fields
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar, get_args
 
 import numpy as np
 from numpy.random import Generator
 
 from derain.simulation.arrays import Floats
 from derain.simulation.defects import Defects
-from derain.simulation.drawing import draw_name
-from derain.simulation.sensor import Sensor
-from derain.simulation.spans import DefectSpans, SensorSpans, draw
+from derain.simulation.drawing import Span, log_uniform, pick
+from derain.simulation.sensor import MOST_BEAMS, ReturnMode, Sensor
+from derain.simulation.settings import LogSpan, Positive, Settings, Share, weights_of
 from derain.views.spherical_grid import ALL_AROUND, FULL_CIRCLE
 
+# Sensors of today have at most 256.
+MOST_ROWS = 4096
+
+
+@dataclass(frozen=True)
+class Spans(Settings):
+    """Settings that are spans, from which values are drawn by name."""
+
+    def draw(self, name: str, generator: Generator) -> float:
+        """Draws from a span: evenly in its logarithm from a LogSpan, else evenly."""
+        span: Span = getattr(self, name)
+        kind = next(one.type for one in fields(self) if one.name == name)
+        if kind == LogSpan:
+            return log_uniform(span, generator)
+        return float(generator.uniform(*span))
+
+
+@dataclass(frozen=True)
+class DefectSpans(Spans):
+    """What the defects of sensors are drawn from; shares are drawn evenly.
+
+    Attributes:
+        SUBJECT = "defect spans"
+    none: Share of the sensors without any.
+        each: How probable each defect is in the others.
+        dropped: See :class:`derain.simulation.defects.Defects`, as for all that follow.
+        dropped_rows: Likewise.
+        dropped_sectors: Likewise.
+        mixed: Likewise.
+        merging: Likewise, metres.
+        range_step: Likewise, metres.
+        copies: Likewise, of sensors that report one return. Dual ones copy all or none.
+    """
+
+    SUBJECT = "defect spans"
+    none: Share = 0.3
+    each: Share = 0.5
+    dropped: Span = (0.0, 0.3)
+    dropped_rows: Span = (0.0, 0.05)
+    dropped_sectors: Span = (0.0, 0.05)
+    mixed: Span = (0.02, 0.5)
+    merging: Span = (0.2, 2.0)
+    range_step: Span = (0.002, 0.02)
+    copies: Span = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class SensorSpans(Spans):
+    """What sensors are drawn from. The defaults span the sensors of today.
+
+    Angles are in degrees, distances in metres. Spans of a decade or more are
+    log-uniform where stated, the others uniform.
+
+    Attributes:
+        kinds: Weight of each kind: ``spinning`` sees a full circle in rows, ``front`` looks one way
+            in rows, ``rosette`` one way along a rosette.
+        spinning_rows: Rows of a spinning sensor, each as probable.
+        spinning_field: Angle between its lowest and highest row; the narrower of two draws.
+        spinning_centre: Inclination of the middle between them.
+        azimuth_step: Between its columns. Log-uniform.
+        uneven: Share of spinning sensors whose rows are closer together at the horizon.
+        row_azimuth: Most that its rows are turned.
+        front_rows: Rows of a sensor that looks one way, each as probable.
+        front_width: Its field of view, from right to left.
+        front_height: Likewise, from bottom to top.
+        front_step: Between its columns.
+        rosette_width: Diameter of a rosette.
+        rosette_beams: Shots of a rosette. Log-uniform.
+        prism_turns: Turns of the faster prism in a scan. Log-uniform.
+        most_beams: Where a sensor would have more, its columns are farther apart.
+        returns: Weight of what is reported of a beam that several things return.
+        range_noise: Log-uniform.
+        range_noise_growth: Metres per metre.
+        weak_range_noise: Metres.
+        encoder_noise: Degrees.
+        intensity_noise: Relative to intensity.
+        mounting_height: Metres.
+        tilt: Roll and pitch, either way.
+        head_down: Share of the sensors that are mounted head down besides.
+        head_down_pitch: By so much.
+        minimum_range: Log-uniform.
+        maximum_range: Log-uniform.
+        detection_threshold: Log-uniform, m⁻².
+        aperture: Metres.
+        beam_divergence: Log-uniform, radians.
+        frame_rate: Hz.
+        defects: What is wrong with them.
+
+    Raises:
+        InputError: A value that is impossible.
+    """
+
+    SUBJECT = "sensor spans"
+    kinds: Mapping[str, float] = field(
+        default_factory=lambda: {"spinning": 0.7, "front": 0.2, "rosette": 0.1}
+    )
+    spinning_rows: tuple[int, ...] = (16, 32, 40, 64, 128)
+    spinning_field: Span = (20.0, 90.0)
+    spinning_centre: Span = (-12.0, 0.0)
+    azimuth_step: LogSpan = (0.08, 0.4)
+    uneven: Share = 0.5
+    row_azimuth: Span = (0.0, 5.0)
+    front_rows: tuple[int, ...] = (64, 96, 128, 192, 256)
+    front_width: Span = (60.0, 120.0)
+    front_height: Span = (12.0, 40.0)
+    front_step: LogSpan = (0.08, 0.3)
+    rosette_width: Span = (38.0, 75.0)
+    rosette_beams: LogSpan = (10_000.0, 60_000.0)
+    prism_turns: LogSpan = (8.0, 40.0)
+    most_beams: int = 150_000
+    returns: Mapping[str, float] = field(
+        default_factory=lambda: {"strongest": 0.6, "last": 0.1, "dual": 0.3}
+    )
+    range_noise: LogSpan = (0.005, 0.05)
+    range_noise_growth: Span = (0.0, 0.0005)
+    weak_range_noise: Span = (0.0, 0.05)
+    encoder_noise: Span = (0.0, 0.02)
+    intensity_noise: Span = (0.05, 0.3)
+    mounting_height: Span = (0.3, 2.8)
+    tilt: Span = (0.0, 4.0)
+    head_down: Share = 0.1
+    head_down_pitch: Span = (10.0, 25.0)
+    minimum_range: LogSpan = (0.3, 3.0)
+    maximum_range: LogSpan = (50.0, 250.0)
+    detection_threshold: LogSpan = (3e-7, 5e-5)
+    aperture: Span = (0.0, 0.012)
+    beam_divergence: LogSpan = (1e-3, 4e-3)
+    frame_rate: Span = (5.0, 20.0)
+    defects: DefectSpans = field(default_factory=DefectSpans)
+    READ_BY: ClassVar = {
+        "kinds": weights_of("spinning", "front", "rosette"),
+        "returns": weights_of(*get_args(ReturnMode)),
+    }
+
+    def _possible(self) -> dict[str, bool]:
+        return {
+            "spinning_rows": _are_rows(self.spinning_rows),
+            "front_rows": _are_rows(self.front_rows),
+            "most_beams": 1 <= self.most_beams <= MOST_BEAMS,
+        }
+
+
+def _are_rows(rows: tuple[int, ...]) -> bool:
+    return bool(rows) and all(2 <= count <= MOST_ROWS for count in rows)
+
+
 # The numbers of any sensor, drawn from the spans of their names.
-NUMBERS = [one.name for one in fields(Sensor) if one.type is float]
+NUMBERS = [one.name for one in fields(Sensor) if one.type in (float, Positive)]
 
 # Defects that only some sensors have.
 DEFECTS = ("dropped", "dropped_rows", "dropped_sectors", "mixed", "range_step", "copies")
@@ -39,12 +186,12 @@ def draw_sensor(spans: SensorSpans, generator: Generator) -> Sensor:
         InputError: The spans allow for what no sensor can be, and it was drawn.
     """
     patterns = {"spinning": _spinning, "front": _front, "rosette": _rosette}
-    pattern = patterns[draw_name(spans.kinds, generator)](spans, generator)
-    roll, pitch = (draw(spans, "tilt", generator) * generator.choice([-1, 1]) for _ in range(2))
+    pattern = patterns[pick(spans.kinds, generator)](spans, generator)
+    roll, pitch = (spans.draw("tilt", generator) * generator.choice([-1, 1]) for _ in range(2))
     if generator.random() < spans.head_down:
-        pitch += draw(spans, "head_down_pitch", generator)
-    returns: Any = draw_name(spans.returns, generator)
-    drawn: dict[str, Any] = {name: draw(spans, name, generator) for name in NUMBERS}
+        pitch += spans.draw("head_down_pitch", generator)
+    returns: Any = pick(spans.returns, generator)
+    drawn: dict[str, Any] = {name: spans.draw(name, generator) for name in NUMBERS}
     return Sensor(
         **pattern,
         **drawn,
@@ -64,24 +211,24 @@ def draw_defects(spans: DefectSpans, generator: Generator, *, dual: bool) -> Def
             two of every beam, be they the same.
     """
     some = generator.random() >= spans.none
-    values = {name: draw(spans, name, generator) for name in DEFECTS}
+    values = {name: spans.draw(name, generator) for name in DEFECTS}
     has = {name: some and generator.random() < spans.each for name in DEFECTS}
     if dual:
         values["copies"], has["copies"] = 1.0, generator.random() < 0.5
     return Defects(
         **{name: value for name, value in values.items() if has[name]},
-        merging=draw(spans, "merging", generator),
+        merging=spans.draw("merging", generator),
     )
 
 
 def _spinning(spans: SensorSpans, generator: Generator) -> dict[str, Any]:
     rows = int(generator.choice(spans.spinning_rows))
-    height = min(draw(spans, "spinning_field", generator) for _ in range(2))
-    centre = draw(spans, "spinning_centre", generator)
+    height = min(spans.draw("spinning_field", generator) for _ in range(2))
+    centre = spans.draw("spinning_centre", generator)
     inclination = max(centre - height / 2, -90.0), min(centre + height / 2, 90.0)
     even = generator.random() >= spans.uneven
-    turned = draw(spans, "row_azimuth", generator)
-    step = draw(spans, "azimuth_step", generator)
+    turned = spans.draw("row_azimuth", generator)
+    step = spans.draw("azimuth_step", generator)
     return {
         "azimuth": ALL_AROUND,
         "inclination": inclination,
@@ -94,21 +241,21 @@ def _spinning(spans: SensorSpans, generator: Generator) -> dict[str, Any]:
 
 def _front(spans: SensorSpans, generator: Generator) -> dict[str, Any]:
     rows = int(generator.choice(spans.front_rows))
-    width, height = (draw(spans, name, generator) for name in ("front_width", "front_height"))
-    centre = draw(spans, "spinning_centre", generator) / 2
+    width, height = (spans.draw(name, generator) for name in ("front_width", "front_height"))
+    centre = spans.draw("spinning_centre", generator) / 2
     return {
         "azimuth": (-width / 2, width / 2),
         "inclination": (centre - height / 2, centre + height / 2),
         "rows": rows,
-        "columns": _columns(width, draw(spans, "front_step", generator), rows, spans),
+        "columns": _columns(width, spans.draw("front_step", generator), rows, spans),
     }
 
 
 def _rosette(spans: SensorSpans, generator: Generator) -> dict[str, Any]:
-    radius = draw(spans, "rosette_width", generator) / 2
+    radius = spans.draw("rosette_width", generator) / 2
     lasers = int(generator.choice(LASERS))
-    beams = min(round(draw(spans, "rosette_beams", generator)), spans.most_beams)
-    turns = draw(spans, "prism_turns", generator)
+    beams = min(round(spans.draw("rosette_beams", generator)), spans.most_beams)
+    turns = spans.draw("prism_turns", generator)
     return {
         "pattern": "rosette",
         "azimuth": (-radius, radius),

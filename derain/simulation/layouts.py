@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from numpy.random import Generator
 
-from derain.simulation import facility, layout
+from derain.simulation import facility
 from derain.simulation.places import car_park, city, country, garage, motorway, room, yard
 from derain.simulation.track import Track
 
@@ -18,7 +18,7 @@ LAYOUTS: dict[str, Callable[[Generator], Track]] = {
     "garage": garage.lay_out_garage,
     "motorway": motorway.lay_out_motorway,
     "room": room.lay_out_room,
-    "street": layout.lay_out_track,
+    "street": facility.lay_out_track,
     "yard": yard.lay_out_yard,
 }
 

@@ -24,7 +24,7 @@ MAKER = "derain.simulation"
 SPLIT_PARTS = ("train", "validation", "test")
 
 # Keys of the sequences of each part, of the rain rate of each sequence, of the checksums by path,
-# and of whether a person asked for the data set.
+# and of whether the data set is a person's own.
 SPLIT, RAIN_RATE, FILES, KEEP = "split", "rain_rate_mm_h", "files", "keep"
 
 # In bytes. The entry of a file takes 130, so that half a million files fit.

@@ -1,4 +1,4 @@
-"""The things that stand on the simulated track, each at the origin of its own frame.
+"""Surfaces, and the things that stand on the simulated track, each at the origin of its own frame.
 
 Reflectivities are modelling choices for a near-infrared LiDAR, drawn per object; sizes are those of
 everyday objects.
@@ -15,6 +15,8 @@ from derain.simulation.arrays import Floats
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import Span, log_uniform, log_uniforms
 from derain.simulation.shapes import Triangles
+
+BACKGROUND = TrackClass.BACKGROUND
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +63,7 @@ def of_material(
     parts: Sequence[Triangles],
     reflectivity: Span,
     generator: Generator,
-    label: TrackClass = TrackClass.BACKGROUND,
+    label: TrackClass = BACKGROUND,
 ) -> Surface:
     """Parts as one surface, its reflectivity log-uniform between two values."""
     return Surface(np.concatenate(parts), label, log_uniform(reflectivity, generator))
@@ -80,7 +82,7 @@ def spotted(
     """
     usual = log_uniform(reflectivity, generator)
     spots = usual * np.exp(generator.normal(0, spread, len(triangles)))
-    return Surface(triangles, TrackClass.BACKGROUND, np.clip(spots, 0.003, 1))
+    return Surface(triangles, BACKGROUND, np.clip(spots, 0.003, 1))
 
 
 def asphalt(x: tuple[float, float], y: tuple[float, float], generator: Generator) -> Surface:
@@ -91,7 +93,7 @@ def asphalt(x: tuple[float, float], y: tuple[float, float], generator: Generator
 def ground(x: tuple[float, float], y: tuple[float, float], generator: Generator) -> Surface:
     """The ground under and beside the road, a centimetre lower so that the road is on top."""
     plane = shapes.rectangle(x, y, -0.01)
-    return Surface(plane, TrackClass.BACKGROUND, generator.uniform(0.05, 0.3))
+    return Surface(plane, BACKGROUND, generator.uniform(0.05, 0.3))
 
 
 def car(generator: Generator) -> Surface:
@@ -154,13 +156,13 @@ def sprinklers(places: Floats, aside: float, generator: Generator) -> Iterator[S
 def pole(generator: Generator) -> Surface:
     """A thin post: of a fence, a sign or a lamp."""
     post = shapes.cylinder(generator.uniform(0.01, 0.06), 0, generator.uniform(0.8, 6.0))
-    return Surface(post, TrackClass.BACKGROUND, generator.uniform(0.02, 0.5))
+    return Surface(post, BACKGROUND, generator.uniform(0.02, 0.5))
 
 
 def trunk(generator: Generator) -> Surface:
     """The trunk of a tree."""
     stem = shapes.cylinder(generator.uniform(0.08, 0.25), 0, 3)
-    return Surface(stem, TrackClass.BACKGROUND, generator.uniform(0.05, 0.3))
+    return Surface(stem, BACKGROUND, generator.uniform(0.05, 0.3))
 
 
 def tree(crown: float, generator: Generator) -> Iterator[Surface]:
@@ -184,7 +186,7 @@ def building(generator: Generator) -> Surface:
     """A flat-roofed building."""
     length, width = generator.uniform(5, 15), generator.uniform(10, 40)
     walls = shapes.box(length, width, 0, generator.uniform(3, 9))
-    return Surface(walls, TrackClass.BACKGROUND, generator.uniform(0.1, 0.6))
+    return Surface(walls, BACKGROUND, generator.uniform(0.1, 0.6))
 
 
 def foliage(radii: tuple[float, float, float], height: float, generator: Generator) -> Surface:
@@ -202,4 +204,69 @@ def foliage(radii: tuple[float, float, float], height: float, generator: Generat
     count = int(generator.uniform(30, 250) * surface_area)
     leaves = shapes.leaves(shapes.inside_ellipsoid(count, radii, generator), 0.02, generator)
     reflectivity = log_uniforms((0.003, 0.4), count, generator)
-    return Surface(shapes.raised(leaves, height), TrackClass.BACKGROUND, reflectivity)
+    return Surface(shapes.raised(leaves, height), BACKGROUND, reflectivity)
+
+
+# Of what returns, and of what reflects so little towards the sensor that no detector sees it.
+PAINT = (0.01, 0.6)
+MIRROR = 1e-9
+
+# Nothing is nearer to the sensor, metres.
+NEAREST_SPECK = 0.15
+
+# Size of a speck over its distance from the sensor: it returns one ray or two.
+SIZE = (1.5e-3, 8e-3)
+
+
+def specks(surface: Triangles, sensor: Floats, count: int, generator: Generator) -> Triangles:
+    """Small triangles on a surface, evenly or in clumps, so that few rays meet one.
+
+    Args:
+        surface: Triangles that they lie on, (T, 3, 3), metres.
+        sensor: Place of the sensor, (3,), metres. The farther a speck is, the larger it is, so that
+            a beam, which widens as well, is returned by it.
+        count: How many.
+        generator: Random generator.
+
+    Returns:
+        At most so many; fewer where they would be too near to the sensor.
+    """
+    places = on_surface(surface, count, generator)
+    # A clump is what lies nearest to one of a few places: the rest of the surface stays empty.
+    share = generator.choice([1.0, 0.4, 0.15])
+    clumps = places[generator.integers(len(places), size=1 + count // 25)]
+    from_clumps = np.linalg.norm(places[:, None] - clumps, axis=2).min(axis=1)
+    places = places[from_clumps <= np.quantile(from_clumps, share)]
+    size = log_uniform(SIZE, generator) * np.linalg.norm(places - sensor, axis=1)
+    corners = generator.normal(0, 1, (len(places), 3, 3))
+    small = places[:, None] + size[:, None, None] * np.clip(corners, -2, 2)
+    away = np.linalg.norm(small - sensor, axis=2).min(axis=1)
+    return np.asarray(small[away > NEAREST_SPECK])
+
+
+def mirrored(
+    surface: Surface, sensor: Floats, count: int, generator: Generator
+) -> Iterator[Surface]:
+    """A surface that mirrors the light away and hides what is behind it, with specks on it.
+
+    Args:
+        surface: The surface as it would be if it returned all over.
+        sensor: Place of the sensor, (3,), metres.
+        count: How many specks.
+        generator: Random generator.
+    """
+    yield replace(surface, reflectivity=MIRROR)
+    on_it = specks(surface.triangles, sensor, count, generator)
+    if len(on_it):
+        yield Surface(on_it, surface.label, log_uniform(PAINT, generator))
+
+
+def on_surface(surface: Triangles, count: int, generator: Generator) -> Floats:
+    """Places uniform over the area of triangles, (count, 3), metres."""
+    first, second, third = surface.transpose(1, 0, 2)
+    area = np.linalg.norm(np.cross(second - first, third - first), axis=1)
+    which = generator.choice(len(surface), count, p=area / area.sum())
+    u, v = generator.random((2, count, 1))
+    beyond = u + v > 1
+    u, v = np.where(beyond, 1 - u, u), np.where(beyond, 1 - v, v)
+    return np.asarray(first[which] + u * (second - first)[which] + v * (third - first)[which])

@@ -16,8 +16,7 @@ from numpy.random import Generator
 from derain.scan import Scan
 from derain.simulation.arrays import Floats
 from derain.simulation.classes import TrackClass
-from derain.simulation.marshall_palmer import EXTINCTION_EFFICIENCY, extinction
-from derain.simulation.rain_field import RainField
+from derain.simulation.rain_field import EXTINCTION_EFFICIENCY, RainField, extinction
 from derain.simulation.sensor import Sensor
 from derain.simulation.track import Track
 

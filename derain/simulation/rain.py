@@ -8,14 +8,14 @@ from numpy.random import Generator
 
 from derain.simulation.arrays import Columns, Floats, Ints
 from derain.simulation.classes import TrackClass
-from derain.simulation.marshall_palmer import (
+from derain.simulation.rain_field import (
     LARGEST_DROP,
+    RainField,
     draw_diameters,
     drops_per_cubic_metre,
     extinction,
     slope,
 )
-from derain.simulation.rain_field import RainField
 from derain.simulation.sensor import Returns, Sensor
 
 # Fresnel reflectivity of water (refractive index 1.328 at 905 nm) at normal incidence. That a drop
@@ -54,11 +54,11 @@ def draw_drops(rate: float, reach: Floats, sensor: Sensor, generator: Generator)
     """
     far = np.maximum(reach, sensor.minimum_range)
     near = np.full_like(far, sensor.minimum_range)
-    expected = drops_per_cubic_metre(rate) * sensor.beam_volume(near, far)
-    beam = np.repeat(np.arange(len(far)), generator.poisson(expected))
     # The volume up to some distance grows with the cube of the beam's width there. So the cube of
     # the width is uniform between those at both ends for drops that are uniform in the volume.
     narrowest, widest = sensor.beam_width(near) ** 3, sensor.beam_width(far) ** 3
+    volume = math.pi / 12 / sensor.beam_spread * (widest - narrowest)
+    beam = np.repeat(np.arange(len(far)), generator.poisson(drops_per_cubic_metre(rate) * volume))
     share = generator.random(len(beam))
     width = np.cbrt(narrowest[beam] + share * (widest - narrowest)[beam])
     distance = (width - sensor.aperture) / sensor.beam_spread
@@ -175,26 +175,14 @@ def rain_on_beams(
     """
     transmission = Transmission(rain, sensor.maximum_range)
     solid = sensor.detected(clear, transmission(beams, clear.range))
-    drops = _visible_drops(clear.range, beams, rain, sensor, transmission, generator)
-    return sensor.reported(Returns.joined([solid, drops]))
-
-
-def _visible_drops(
-    reach: Floats,
-    beams: Floats,
-    rain: RainField,
-    sensor: Sensor,
-    transmission: Transmission,
-    generator: Generator,
-) -> Returns:
-    """Drops that the sensor would see if there were nothing else in their beams."""
     # A drop that could not be seen even through clear air is left out first, which saves work.
-    reach = np.minimum(reach, farthest_visible_drop(sensor))
+    reach = np.minimum(clear.range, farthest_visible_drop(sensor))
     drops = draw_drops(rain.heaviest, reach, sensor, generator)
     needed = sensor.detection_threshold * drops.range**2
     drops = drops.take(drop_reflectivity(drops, sensor) >= needed)
     drops = thin_out(drops, beams, rain, generator)
     reflectivity = drop_reflectivity(drops, sensor) * transmission(beams[drops.beam], drops.range)
-    seen = reflectivity >= sensor.detection_threshold * drops.range**2
-    label = np.full(np.count_nonzero(seen), TrackClass.RAIN, np.int64)
-    return Returns(drops.range[seen], reflectivity[seen], label, drops.beam[seen])
+    label = np.full(len(drops.beam), TrackClass.RAIN, np.int64)
+    wet = Returns(drops.range, reflectivity, label, drops.beam)
+    visible = wet.take(reflectivity >= sensor.detection_threshold * wet.range**2)
+    return sensor.reported(Returns.joined([solid, visible]))

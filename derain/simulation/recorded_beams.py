@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from derain.scan import Scan
 from derain.simulation.arrays import Bools, Floats, Ints
-from derain.simulation.scan_pattern import unit_vectors
+from derain.simulation.sensor import unit_vectors
 from derain.views.directions import directions
 from derain.views.grid_fit import GridFit, fit_grid
 from derain.views.spherical_grid import ALL_AROUND, FULL_CIRCLE

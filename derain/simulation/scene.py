@@ -13,10 +13,17 @@ from derain.simulation.arrays import Floats
 from derain.simulation.campaign import Campaign
 from derain.simulation.classes import packed
 from derain.simulation.layouts import LAYOUTS
-from derain.simulation.marshall_palmer import INTERCEPT, extinction, slope
 from derain.simulation.objects import Surface
-from derain.simulation.rain_field import RainField, SprinkledRain, UniformRain
+from derain.simulation.rain_field import (
+    INTERCEPT,
+    RainField,
+    SprinkledRain,
+    UniformRain,
+    extinction,
+    slope,
+)
 from derain.simulation.sensor import Returns, Sensor
+from derain.simulation.shapes import Place
 from derain.simulation.street import Street, lay_out_street
 from derain.simulation.track import Track
 from derain.simulation.traffic import Course, MovingThing, draw_traffic
@@ -35,46 +42,34 @@ MEDIAN_VOLUME_DIAMETER = 3.67
 STRONGEST_WIND = 2.0
 
 
-@dataclass(frozen=True)
-class Weather:
-    """What a weather station and a disdrometer would measure; units are in the names.
+def weather_record(nominal: float, at_sensor: float, wind: Place) -> dict[str, float]:
+    """What a weather station and a disdrometer would measure of some rain.
 
     The drop spectrum N(D) = intercept · exp(−slope · D), the median diameter by volume and the
     visibility are those of the nominal rate. Clear air has an infinite slope, drops of no diameter,
     and no end to its visibility (``inf``). The wind's direction is where it blows to, from x
     (ahead) towards y (left).
+
+    Args:
+        nominal: Nominal rain rate, mm/h.
+        at_sensor: Rain rate at the sensor's place, mm/h.
+        wind: Velocity towards x (ahead) and y (left), m/s.
+
+    Returns:
+        Values by names, in which the units are.
     """
-
-    rain_rate_mm_h: float
-    rain_rate_at_sensor_mm_h: float
-    drop_intercept_per_m3_mm: float
-    drop_slope_per_mm: float
-    median_volume_diameter_mm: float
-    wind_speed_m_s: float
-    wind_direction_deg: float
-    visibility_m: float
-
-    @classmethod
-    def of(cls, nominal: float, at_sensor: float, wind: tuple[float, float]) -> Self:
-        """The record of some rain.
-
-        Args:
-            nominal: Rain rate asked for, mm/h.
-            at_sensor: Rain rate at the sensor's place, mm/h.
-            wind: Velocity towards x (ahead) and y (left), m/s.
-        """
-        steepness = float(slope(nominal))
-        visibility = VISIBLE_OPTICAL_DEPTH / float(extinction(nominal)) if nominal else math.inf
-        return cls(
-            rain_rate_mm_h=nominal,
-            rain_rate_at_sensor_mm_h=at_sensor,
-            drop_intercept_per_m3_mm=INTERCEPT,
-            drop_slope_per_mm=steepness,
-            median_volume_diameter_mm=MEDIAN_VOLUME_DIAMETER / steepness,
-            wind_speed_m_s=math.hypot(*wind),
-            wind_direction_deg=math.degrees(math.atan2(wind[1], wind[0])),
-            visibility_m=visibility,
-        )
+    steepness = float(slope(nominal))
+    visibility = VISIBLE_OPTICAL_DEPTH / float(extinction(nominal)) if nominal else math.inf
+    return {
+        "rain_rate_mm_h": nominal,
+        "rain_rate_at_sensor_mm_h": at_sensor,
+        "drop_intercept_per_m3_mm": INTERCEPT,
+        "drop_slope_per_mm": steepness,
+        "median_volume_diameter_mm": MEDIAN_VOLUME_DIAMETER / steepness,
+        "wind_speed_m_s": math.hypot(*wind),
+        "wind_direction_deg": math.degrees(math.atan2(wind[1], wind[0])),
+        "visibility_m": visibility,
+    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +79,7 @@ class SimulatedScene:
     Attributes:
         track: What stands.
         rain: The rain; it is the same wherever the sensor is.
-        weather: The record of it.
+        weather: The record of it, see :func:`weather_record`.
         course: How the sensor moves; None stands at the origin of the track.
         traffic: What else moves.
         skew: Whether they move on while a scan is taken, see :class:`Drive`.
@@ -92,7 +87,7 @@ class SimulatedScene:
 
     track: Track
     rain: RainField
-    weather: Weather
+    weather: dict[str, float]
     course: Course | None = None
     traffic: Sequence[MovingThing] = ()
     skew: bool = False
@@ -108,7 +103,7 @@ class SimulatedScene:
         sprinkled = campaign.layout == "facility" and nominal > 0
         rain = SprinkledRain(nominal, wind) if sprinkled else UniformRain(nominal)
         at_sensor = float(rain.rate(np.zeros(1), np.zeros(1))[0])
-        weather = Weather.of(nominal, at_sensor, wind)
+        weather = weather_record(nominal, at_sensor, wind)
         if campaign.drive is None:
             return cls(LAYOUTS[campaign.layout](generator), rain, weather)
         drive, times = campaign.drive, campaign.times
@@ -177,7 +172,7 @@ def _nearer(first: Returns, second: Returns) -> Returns:
     return Returns.joined([first, second]).take(rows + len(rows) * nearer)
 
 
-def draw_wind(generator: Generator) -> tuple[float, float]:
+def draw_wind(generator: Generator) -> Place:
     """Draws a wind: its velocity towards x (ahead) and y (left), m/s."""
     ahead, left = generator.uniform(-STRONGEST_WIND, STRONGEST_WIND, 2)
     return float(ahead), float(left)

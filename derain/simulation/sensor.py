@@ -3,21 +3,21 @@
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from numpy.random import Generator
+from numpy.typing import ArrayLike
 
 from derain.files.documents import Entry
 from derain.files.extrinsics import Extrinsics
 from derain.files.packaged import packaged, packaged_or_own
 from derain.scan import Scan
 from derain.simulation.arrays import Floats, Ints
+from derain.simulation.arrays import Returns as Returns
 from derain.simulation.classes import TrackClass
 from derain.simulation.defects import Defects
-from derain.simulation.returns import Returns as Returns
-from derain.simulation.scan_pattern import rosette, unit_vectors
-from derain.simulation.settings import Settings
+from derain.simulation.settings import Positive, Settings
 from derain.views.spherical_grid import FULL_CIRCLE
 
 FULL_SCALE_INTENSITY = 255.0
@@ -93,6 +93,7 @@ class Sensor(Settings):
         InputError: A value that no sensor can have.
     """
 
+    SUBJECT = "sensor"
     azimuth: tuple[float, float] = (-57.5, 57.5)
     inclination: tuple[float, float] = (-17.5, 7.5)
     columns: int = 400
@@ -102,11 +103,11 @@ class Sensor(Settings):
     pattern: Pattern = "grid"
     prism_turns: tuple[float, float] = (12.16, -7.77)
     tilt: tuple[float, float] = (0.0, 0.0)
-    minimum_range: float = 1.0
+    minimum_range: Positive = 1.0
     maximum_range: float = 120.0
     aperture: float = 0.0
-    beam_divergence: float = 1.5e-3
-    detection_threshold: float = 4e-6
+    beam_divergence: Positive = 1.5e-3
+    detection_threshold: Positive = 4e-6
     range_noise: float = 0.02
     range_noise_growth: float = 0.0
     weak_range_noise: float = 0.0
@@ -114,12 +115,12 @@ class Sensor(Settings):
     intensity_noise: float = 0.15
     mounting_height: float = 1.3
     returns: ReturnMode = "strongest"
-    frame_rate: float = 10.0
+    frame_rate: Positive = 10.0
     defects: Defects = field(default_factory=Defects)
 
-    def __post_init__(self) -> None:
+    def _possible(self) -> dict[str, bool]:
         (right, left), (lowest, highest) = self.azimuth, self.inclination
-        possible = {
+        return {
             "azimuth": right < left <= right + FULL_CIRCLE,
             "inclination": -90 <= lowest < highest <= 90,
             "columns": isinstance(self.columns, int) and 1 <= self.columns <= MOST_BEAMS,
@@ -128,18 +129,12 @@ class Sensor(Settings):
             and all(-90 <= inclination <= 90 for inclination in self.row_inclinations),
             "row_azimuths": len(self.row_azimuths) in (0, self.rows)
             and all(abs(azimuth) <= FULL_CIRCLE for azimuth in self.row_azimuths),
-            "pattern": self.pattern in get_args(Pattern),
             "prism_turns": all(abs(turns) <= MOST_TURNS for turns in self.prism_turns),
             "tilt": all(abs(angle) <= 90 for angle in self.tilt),
-            "minimum_range": self.minimum_range > 0,
             "maximum_range": self.minimum_range < self.maximum_range < math.inf,
             "beam_divergence": 0 < self.beam_divergence < math.pi,
-            "detection_threshold": 0 < self.detection_threshold < math.inf,
             "encoder_noise": 0 <= self.encoder_noise < FULL_CIRCLE,
-            "returns": self.returns in get_args(ReturnMode),
-            "frame_rate": 0 < self.frame_rate < math.inf,
         }
-        self._refuse_impossible("sensor", possible)
 
     def beams(self) -> Floats:
         """Unit vectors along the beams, float64 (rows · columns, 3), frame of the level sensor.
@@ -160,18 +155,36 @@ class Sensor(Settings):
 
         Both can be broadcast to (rows, columns).
         """
-        if self.pattern == "rosette":
-            field, shape = (self.azimuth, self.inclination), (self.rows, self.columns)
-            azimuth, rows = rosette(field, shape, self.prism_turns, self.row_inclinations)
-        else:
-            right, left = self.azimuth
-            closed = left - right == FULL_CIRCLE
-            azimuth = np.linspace(left, right, self.columns, endpoint=not closed)[None, :]
-            table = self.row_inclinations or np.linspace(*self.inclination[::-1], self.rows)
-            rows = np.array(table)[:, None]
+        azimuth, inclination = self._rosette() if self.pattern == "rosette" else self._grid()
         if self.row_azimuths:
             azimuth = azimuth + np.array(self.row_azimuths)[:, None]
-        return azimuth, rows
+        return azimuth, inclination
+
+    def _grid(self) -> tuple[Floats, Floats]:
+        right, left = self.azimuth
+        closed = left - right == FULL_CIRCLE
+        azimuth = np.linspace(left, right, self.columns, endpoint=not closed)[None, :]
+        table = self.row_inclinations or np.linspace(*self.inclination[::-1], self.rows)
+        return azimuth, np.array(table)[:, None]
+
+    def _rosette(self) -> tuple[Floats, Floats]:
+        """Directions of lasers that look through two wedge prisms, which turn at different speeds.
+
+        Each prism deflects by half of what the two can do together, towards where it is turned to;
+        the deflections add up, so that the shots fill an ellipse with a rosette.
+
+        Source: Brazeal et al. 2021, "A rigorous observation model for the Risley prism-based Livox
+        Mid-40 lidar sensor", here to the first order in the deflections.
+        """
+        offsets = np.array(self.row_inclinations)[:, None] if self.row_inclinations else 0.0
+        # Lasers that look the same way fire along one curve in turn.
+        delay = np.zeros(self.rows) if self.row_inclinations else np.arange(self.rows) / self.rows
+        share = (np.arange(self.columns) + delay[:, None]) / self.columns
+        first, second = (2 * np.pi * turns * share for turns in self.prism_turns)
+        (right, left), (lowest, highest) = self.azimuth, self.inclination
+        azimuth = (left + right) / 2 + (left - right) / 4 * (np.cos(first) + np.cos(second))
+        swing = (highest - lowest) / 4 * (np.sin(first) + np.sin(second))
+        return azimuth, (highest + lowest) / 2 + offsets + swing
 
     def beam_times(self) -> Floats:
         """When each beam is sent, float64 (rows · columns,), seconds after the scan begins.
@@ -189,11 +202,6 @@ class Sensor(Settings):
     def beam_width(self, range: Floats) -> Floats:
         """Width of a beam at distances in metres, in metres."""
         return self.aperture + self.beam_spread * range
-
-    def beam_volume(self, near: Floats, far: Floats) -> Floats:
-        """Volume of a beam's cone between two distances in metres, in cubic metres."""
-        widths = self.beam_width(far) ** 3 - self.beam_width(near) ** 3
-        return math.pi / 12 / self.beam_spread * widths
 
     def detected(self, clear: Returns, transmission: Floats) -> Returns:
         """What the sensor would see of the surfaces if there were no particles in front of them.
@@ -297,6 +305,23 @@ class Sensor(Settings):
         offset = generator.normal(0, DARK_NOISE, len(reflectivity))
         intensity = FULL_SCALE_INTENSITY * reflectivity * gain + offset
         return np.clip(intensity, 0, FULL_SCALE_INTENSITY)
+
+
+def unit_vectors(azimuth: ArrayLike, inclination: ArrayLike) -> Floats:
+    """Unit vectors along directions.
+
+    Args:
+        azimuth: From x towards y, degrees.
+        inclination: Above the horizon, degrees; the shapes of both are broadcast.
+
+    Returns:
+        float64 (N, 3) in row-major order; x forward, y left, z up.
+    """
+    azimuth, inclination = np.radians(azimuth), np.radians(inclination)
+    x = np.cos(inclination) * np.cos(azimuth)
+    y = np.cos(inclination) * np.sin(azimuth)
+    z = np.broadcast_to(np.sin(inclination), x.shape)
+    return np.stack([x, y, z], axis=-1).reshape(-1, 3)
 
 
 def _greatest(value: Floats, beam: Ints) -> Ints:

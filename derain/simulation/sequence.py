@@ -5,7 +5,7 @@ radar_pcd/000000.bin             a frame of the radar: float32 x, y, z (m), inte
 ext_radar/000000.csv             the same, with all that the radar measured
 lidar_radar_pcd/000000.bin       each scan, joined by the radar frame nearest in time
 lidar_radar_labels/000000.label  uint32 TrackClass per point of it
-weather/000000.csv               the weather during each scan (derain.simulation.scene.Weather)
+weather/000000.csv               the weather during each scan, by scene.weather_record
 extrinsics.yaml                  takes points of radar_pcd and ext_radar to the LiDAR's frame
 
 Each folder also holds metadata.csv: frame, timestamp (seconds from the start). Without a radar its
@@ -17,7 +17,7 @@ a label are then the number of a moving car or pedestrian, from 1 on; 0 is what 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -77,7 +77,7 @@ def write_sequence(folder: Path, campaign: Campaign, name: str) -> None:
         write_scan(folder / FOLDERS.lidar / f"{stem}.bin", scan)
         write_scan(folder / FOLDERS.scans / f"{stem}.bin", joined)
         write_labels(folder / FOLDERS.labels / f"{stem}.label", *unpacked(joined.label))
-        _write_table(folder / "weather" / f"{stem}.csv", asdict(scene.weather))
+        _write_table(folder / "weather" / f"{stem}.csv", scene.weather)
     for kind in (FOLDERS.lidar, FOLDERS.scans, FOLDERS.labels, "weather"):
         _write_times(folder / kind, times)
     if scene.course is not None:

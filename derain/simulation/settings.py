@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from numbers import Real
-from typing import Any, ClassVar, Literal, Self, get_origin
+from typing import Annotated, Any, ClassVar, Literal, Self, get_args, get_origin
 
 from derain.errors import InputError
 from derain.files.documents import Entry, shown
@@ -17,6 +17,28 @@ Parser = Callable[[Entry], Any]
 MOST = 2**31
 
 
+def is_share(value: float) -> bool:
+    """Whether a number is within 0 and 1."""
+    return 0 <= value <= 1
+
+
+def is_positive(value: float) -> bool:
+    """Whether a number is finite and above 0."""
+    return 0 < value < math.inf
+
+
+def is_positive_span(span: Span) -> bool:
+    """Whether a span lies above 0, so that a number can be drawn evenly in its logarithm."""
+    low, high = span
+    return 0 < low <= high < math.inf
+
+
+# Types of settings, each with the rule that its values follow.
+Share = Annotated[float, is_share]
+Positive = Annotated[float, is_positive]
+LogSpan = Annotated[Span, is_positive_span]
+
+
 def weights_of(*names: str) -> Parser:
     """Reads a weight for each of some known names."""
     return lambda entry: entry.record(dict.fromkeys(names, Entry.number))
@@ -27,10 +49,27 @@ class Settings:
     """The base of frozen settings, of which a document states those that differ.
 
     Attributes:
+        SUBJECT: What messages call the settings.
         READ_BY: What reads the attributes that are not read by their types, by name.
+
+    Raises:
+        InputError: A value that is impossible. It names the first such attribute.
     """
 
+    SUBJECT: ClassVar[str]
     READ_BY: ClassVar[Mapping[str, Parser]] = {}
+
+    def __post_init__(self) -> None:
+        special = self._possible()
+        for one in fields(self):
+            value = getattr(self, one.name)
+            if not special.get(one.name, _is_possible(value, one.type)):
+                reason = f"{shown(value)} is impossible"
+                raise InputError(f"{self.SUBJECT}: {one.name}", reason, "Correct it.")
+
+    def _possible(self) -> Mapping[str, bool]:
+        """Whether attributes are possible, by name, of which the type alone does not decide it."""
+        return {}
 
     @classmethod
     def of(cls, entry: Entry) -> Self:
@@ -52,26 +91,18 @@ class Settings:
         except InputError as error:
             raise entry.fault(f"{error.subject}: {error.reason}", error.remedy) from error
 
-    def _refuse_impossible(self, subject: str, possible: Mapping[str, bool]) -> None:
-        """Refuses the first setting that is impossible.
 
-        Args:
-            subject: What messages call the settings.
-            possible: Whether a setting is possible, by name. Of those that are not named numbers
-                must be finite from 0 on, spans finite and ascending, weights from 0 on and some of
-                them above.
+def _is_possible(value: Any, kind: Any) -> bool:
+    """Whether a value is possible by its type.
 
-        Raises:
-            InputError: It names the setting.
-        """
-        for one in fields(self):
-            value = getattr(self, one.name)
-            if not possible.get(one.name, _is_usual(value)):
-                reason = f"{shown(value)} is impossible"
-                raise InputError(f"{subject}: {one.name}", reason, "Correct it.")
-
-
-def _is_usual(value: Any) -> bool:
+    Of a type without a rule, numbers are finite from 0 on, spans finite and ascending, and weights
+    finite from 0 on with some of them above.
+    """
+    if get_origin(kind) is Literal:
+        return value in get_args(kind)
+    if get_origin(kind) is Annotated:
+        is_possible: Callable[[Any], bool] = get_args(kind)[1]
+        return is_possible(value)
     match value:
         case Real():
             return 0 <= float(value) < math.inf
@@ -87,6 +118,8 @@ def _parser(kind: Any) -> Parser:
     """What reads a value of a type."""
     if get_origin(kind) is Literal:
         return Entry.text
+    if get_origin(kind) is Annotated:
+        return _parser(get_args(kind)[0])
     if kind in _PARSERS:
         return _PARSERS[kind]
     read: Parser = kind.of

@@ -11,7 +11,9 @@ from derain.simulation.arrays import Floats
 
 Triangles = Floats
 
-# x, y and z, metres.
+# x and y, and x, y and z, metres.
+Place = tuple[float, float]
+ORIGIN = (0.0, 0.0)
 Point = tuple[float, float, float]
 
 
@@ -44,21 +46,14 @@ def prism(outline: Floats, bottom: float, top: float) -> Triangles:
 
 
 def box(
-    length: float,
-    width: float,
-    bottom: float,
-    top: float,
-    at: tuple[float, float] = (0.0, 0.0),
-    heading: float = 0.0,
+    length: float, width: float, bottom: float, top: float, at: Place = ORIGIN, heading: float = 0.0
 ) -> Triangles:
     """A box about an upright axis at an x and a y, its length along x or a heading in radians."""
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * (length / 2, width / 2)
     return placed(prism(corners, bottom, top), *at, heading)
 
 
-def cylinder(
-    radius: float, bottom: float, top: float, at: tuple[float, float] = (0.0, 0.0)
-) -> Triangles:
+def cylinder(radius: float, bottom: float, top: float, at: Place = ORIGIN) -> Triangles:
     """A twelve-sided cylinder about an upright axis at an x and a y."""
     angle = np.arange(12) * (2 * np.pi / 12)
     outline = radius * np.column_stack([np.cos(angle), np.sin(angle)])

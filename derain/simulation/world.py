@@ -20,16 +20,15 @@ from derain.files.packaged import packaged, packaged_or_own
 from derain.scan import Scan
 from derain.simulation.campaign import SplitSequences
 from derain.simulation.classes import TrackClass, unpacked
-from derain.simulation.drawing import draw_name
-from derain.simulation.drawn_sensor import draw_sensor
+from derain.simulation.drawing import pick
+from derain.simulation.drawn_sensor import SensorSpans, draw_sensor
 from derain.simulation.flying.meeting import meet
 from derain.simulation.flying.precipitation import PrecipitationSpans
 from derain.simulation.layouts import INDOORS, LAYOUTS
 from derain.simulation.places.carrier import lay_out_carrier
 from derain.simulation.places.horizon import lay_out_horizon
 from derain.simulation.sensor import Sensor
-from derain.simulation.settings import Settings, weights_of
-from derain.simulation.spans import SensorSpans
+from derain.simulation.settings import Settings, Share, weights_of
 from derain.simulation.track import Track
 
 # What the folders of a sequence are called.
@@ -61,16 +60,13 @@ class World(Settings):
         InputError: Weights of which none is above 0, or a share outside 0 to 1.
     """
 
+    SUBJECT = "world"
     places: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys(LAYOUTS, 1.0))
-    horizon: float = 0.7
-    carrier: float = 1.0
+    horizon: Share = 0.7
+    carrier: Share = 1.0
     sensors: SensorSpans = field(default_factory=SensorSpans)
     precipitation: PrecipitationSpans = field(default_factory=PrecipitationSpans)
     READ_BY: ClassVar = {"places": weights_of(*LAYOUTS)}
-
-    def __post_init__(self) -> None:
-        shares = {"horizon": 0 <= self.horizon <= 1, "carrier": 0 <= self.carrier <= 1}
-        self._refuse_impossible("world", shares)
 
 
 def packaged_worlds() -> dict[str, Path]:
@@ -107,7 +103,7 @@ def draw_scan(world: World, generator: Generator) -> tuple[Scan, dict[str, Any]]
     """
     for _ in range(MOST_TRIES):
         sensor = draw_sensor(world.sensors, generator)
-        place = draw_name(world.places, generator)
+        place = pick(world.places, generator)
         track = _lay_out(place, world, sensor, generator)
         precipitation = world.precipitation.draw(generator)
         detected = meet(track.cast(sensor), sensor.beams(), precipitation, sensor, generator)

@@ -30,3 +30,31 @@ def random_surfaces(count: int, generator: Generator) -> Returns:
         np.where(nothing, 0, generator.choice([0, 1, 2, 4, 5, 6, 7], count)),
         np.arange(count),
     )
+
+
+def assert_kept_weaker_or_ends_at_a_particle_or_lost(
+    clear: Returns, detected: Returns, sensor: Sensor
+) -> None:
+    """What holds of every beam, whatever flies: no energy comes from nowhere.
+
+    Args:
+        clear: What each beam would return through clear air, one row for each.
+        detected: What the sensor reports of them.
+        sensor: The sensor.
+    """
+    beam, returned = detected.beam, detected.returned
+    wet = detected.label == TrackClass.RAIN
+    kept = returned & ~wet
+    assert set(beam) == set(range(len(clear.beam)))
+    assert (np.diff(beam) >= 0).all()
+    assert np.bincount(beam).max() <= (2 if sensor.returns == "dual" else 1)
+    assert (detected.power[returned] >= sensor.detection_threshold * (1 - 1e-9)).all()
+    assert (detected.reflectivity <= 1).all()
+    assert returned[wet].all()
+    assert (detected.range[wet] <= clear.range[beam[wet]]).all()
+    assert (detected.range[wet] >= sensor.minimum_range * (1 - 1e-12)).all()
+    assert (detected.range[kept] == clear.range[beam[kept]]).all()
+    assert (detected.label[kept] == clear.label[beam[kept]]).all()
+    assert (detected.reflectivity[kept] <= clear.reflectivity[beam[kept]]).all()
+    assert (detected.range[~returned] == sensor.maximum_range).all()
+    assert (detected.label[~returned] == TrackClass.BACKGROUND).all()

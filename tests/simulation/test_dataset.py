@@ -28,7 +28,7 @@ from derain.simulation import sequence
 from derain.simulation.arrays import Bools
 from derain.simulation.campaign import Campaign
 from derain.simulation.classes import TrackClass
-from derain.simulation.dataset import ensure_track, simulate_track
+from derain.simulation.dataset import simulate_track
 from derain.simulation.manifest import read_manifest
 from derain.simulation.sensor import Sensor
 
@@ -72,7 +72,9 @@ def track(open3d: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return root
 
 
-def test_scans_hold_labelled_returns_of_the_sensor_and_rain_by_the_rates(track: Path) -> None:
+def test_scans_hold_labelled_returns_of_their_place_and_rain_by_the_rates(
+    track: Path,
+) -> None:
     rates = read_manifest(track)["rain_rate_mm_h"]
     assert rates == {"000": 0.0, "001": 50.0, "002": 0.0, "003": 50.0}
     for name, rate in rates.items():
@@ -84,9 +86,7 @@ def test_scans_hold_labelled_returns_of_the_sensor_and_rain_by_the_rates(track: 
             assert set(scan.label) <= set(TrackClass)
             assert scan.range.max() < TINY.lidar.maximum_range + 1
             assert np.any(scan.label == TrackClass.RAIN) == (rate > 0)
-
-
-def test_sequences_show_different_places_and_scans_of_one_the_same(track: Path) -> None:
+    # Sequences show different places, and scans of one the same.
     first, again = scans(track, "000")
     other, _ = scans(track, "002")
     assert np.array_equal(first.label, again.label)
@@ -128,6 +128,8 @@ def test_a_run_that_failed_leaves_nothing_half_written_and_is_taken_up_by_any_wo
     kept = times(root / "sequences/000")
     with WorkerPool(2) as workers:
         simulate_track(root, TINY, workers)
+        shutil.rmtree(root / "sequences/002")  # and of one that is complete what is gone
+        simulate_track(root, TINY, workers)
     assert times(root / "sequences/000") == kept
     assert checksums(root) == checksums(track)
 
@@ -142,23 +144,13 @@ def test_shards_make_the_same_data_set_and_the_last_completes_its_manifest(
     assert checksums(root) == checksums(track)
 
 
-def test_a_sequence_that_is_gone_is_simulated_again(track: Path, tmp_path: Path) -> None:
-    root = tmp_path / "track"
-    shutil.copytree(track, root)
-    shutil.rmtree(root / "sequences/002")
-    kept = times(root / "sequences/001")
-    simulate_track(root, TINY)
-    assert times(root / "sequences/001") == kept
-    assert checksums(root) == checksums(track)
-
-
 def test_a_data_set_that_is_there_is_not_made_twice_with_and_without_locks(
     track: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = times(track)
     simulate_track(track, TINY)
     monkeypatch.setitem(sys.modules, "fcntl", None)
-    ensure_track(track, TINY)
+    simulate_track(track, TINY, keep=False)
     assert times(track) == before
 
 
@@ -187,7 +179,7 @@ def test_a_data_set_made_for_a_program_is_replaced_by_that_of_another_campaign(
     root, scan = tmp_path / "track", "sequences/000/lidar_radar_pcd/000000.bin"
     written = set()
     for seed in (0, 1, 2):
-        ensure_track(root, replace(ONE, seed=seed))
+        simulate_track(root, replace(ONE, seed=seed), keep=False)
         assert read_manifest(root)["campaign"]["seed"] == seed
         written.add((root / scan).read_bytes())
         if seed == 1:  # as a replacement leaves it that is killed
@@ -205,22 +197,20 @@ def test_what_others_made_or_cannot_be_is_left_alone(track: Path, tmp_path: Path
         (tmp_path / "thesis.txt", TINY, "is not a folder"),
         (tmp_path / "new", replace(TINY, sensor="mars"), "mars: no such sensor"),
     ):
-        for make in (simulate_track, ensure_track):
+        for keep in (True, False):
             with pytest.raises(InputError, match=reason):
-                make(root, campaign)
+                simulate_track(root, campaign, keep=keep)
     assert times(track) | times(tmp_path) == before
 
 
-@pytest.mark.parametrize(("layout", "intensity_separates"), [("street", False), ("facility", True)])
-def test_intensity_but_not_range_separates_rain_in_the_facility_alone(
-    open3d: ModuleType, tmp_path: Path, layout: str, intensity_separates: bool
+def test_neither_range_nor_intensity_separates_rain_in_a_street(
+    open3d: ModuleType, tmp_path: Path
 ) -> None:
-    simulate_track(tmp_path, replace(ONE, train=3, rain_rates=(50.0,), layout=layout))
+    simulate_track(tmp_path, replace(ONE, train=3, rain_rates=(50.0,)))
     found = [scan for name in ("000", "001", "002") for scan in scans(tmp_path, name)]
     rain = np.concatenate([scan.label == TrackClass.RAIN for scan in found])
     assert best_bound(np.concatenate([scan.range for scan in found]), rain) < 0.6
-    by_intensity = best_bound(np.concatenate([scan.intensity for scan in found]), rain)
-    assert by_intensity > 0.8 if intensity_separates else by_intensity < 0.6
+    assert best_bound(np.concatenate([scan.intensity for scan in found]), rain) < 0.6
 
 
 def best_bound(values: NDArray[np.float32], rain: Bools) -> float:

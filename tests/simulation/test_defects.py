@@ -1,15 +1,15 @@
 """What is wrong with scans: losses, copies, steps, and points between two surfaces."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from derain.errors import InputError
-from derain.simulation.arrays import Floats
+from derain.simulation.arrays import Floats, Returns
 from derain.simulation.classes import TrackClass
 from derain.simulation.defects import SECTORS_OF_A_SCAN, Defects
-from derain.simulation.returns import Returns
 from derain.simulation.sensor import Sensor
 
 ROWS, COLUMNS = 40, 600
@@ -63,21 +63,17 @@ def test_returns_are_lost_each_by_itself_and_rows_and_sectors_as_a_whole() -> No
         assert within(lost, 20 * parts, 0.1)
 
 
-def test_distances_are_multiples_of_the_step_and_no_farther_than_half_of_it() -> None:
-    distance = np.random.default_rng(4).uniform(1, 100, 10_000)
-    stepped = Defects(range_step=0.02).stepped(distance)
-    assert np.allclose(stepped / 0.02, np.round(stepped / 0.02), atol=1e-6)
-    assert np.abs(stepped - distance).max() <= 0.01 + 1e-9
-
-
-def test_a_return_that_is_alone_is_copied_and_two_of_one_beam_are_not() -> None:
+def test_a_return_that_is_alone_is_copied_and_distances_go_to_the_nearest_step() -> None:
+    assert Defects(range_step=0.5).stepped(np.array([1.2, 1.3])).tolist() == [1.0, 1.5]
     beam = np.array([0, 1, 1, 2, 5, 5, 6])
     rows = Defects(copies=1.0).reported(beam, np.random.default_rng(0))
     assert rows.tolist() == [0, 0, 1, 2, 3, 3, 4, 5, 6, 6]
     some = Defects(copies=0.3).reported(np.arange(BEAMS), np.random.default_rng(5))
     assert within(len(some) - BEAMS, BEAMS, 0.3)
     sensor = Sensor(rows=ROWS, columns=COLUMNS, defects=Defects(copies=1.0))
+    sensor = replace(sensor, defects=replace(sensor.defects, range_step=0.02))
     scan = sensor.measure(posts(), np.random.default_rng(0))
+    assert np.abs(scan.range / 0.02 - np.rint(scan.range / 0.02)).max() < 1e-3
     assert len(scan) == 2 * BEAMS
     for column in (scan.xyz, scan.intensity, scan.label):
         assert (column[::2] == column[1::2]).all()

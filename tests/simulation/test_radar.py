@@ -6,13 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.special import spherical_jn, spherical_yn
 
 from derain.scan import Scan
-from derain.simulation import objects, shapes
+from derain.simulation import shapes
 from derain.simulation.arrays import Ints
 from derain.simulation.classes import TrackClass
-from derain.simulation.layout import lay_out_track
+from derain.simulation.facility import lay_out_track
 from derain.simulation.objects import Surface
 from derain.simulation.radar import (
     ECHO_PER_AREA,
@@ -60,57 +59,12 @@ def column(scans: list[Scan], name: str) -> NDArray[np.float32]:
     return np.concatenate([scan.fields[name] for scan in scans])
 
 
-def backscatter_efficiency(size: float, index: complex) -> float:
-    """Of a sphere by Mie's theory; size is its circumference over the wavelength.
-
-    Source: Bohren and Huffman 1983, "Absorption and Scattering of Light by Small Particles", 4.8.
-    """
-    order = np.arange(1, int(size + 4 * size ** (1 / 3) + 10) + 1)
-    inside, derivative = index * size, np.zeros(order[-1] + 16, complex)
-    for n in range(len(derivative) - 1, 0, -1):
-        derivative[n - 1] = n / inside - 1 / (derivative[n] + n / inside)
-    derivative = derivative[1 : order[-1] + 1]
-    psi, before_psi = size * spherical_jn(order, size), size * spherical_jn(order - 1, size)
-    xi = psi + 1j * size * spherical_yn(order, size)
-    before_xi = before_psi + 1j * size * spherical_yn(order - 1, size)
-
-    def coefficient(factor: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        return (factor * psi - before_psi) / (factor * xi - before_xi)
-
-    electric = coefficient(derivative / index + order / size)
-    magnetic = coefficient(derivative * index + order / size)
-    total = np.sum((2 * order + 1) * (-1.0) ** order * (electric - magnetic))
-    return float(abs(total) ** 2 / size**2)
-
-
-@pytest.mark.parametrize("rate", [10, 50])
-def test_rain_scatters_back_as_by_mies_theory(rate: float) -> None:
-    wavelength, water = 299.79 / 77, 3.67 + 2.16j  # mm; at 20 degrees, Liebe et al. 1991
-    diameter = np.linspace(0.02, 8, 400)
-    number = 8000 * np.exp(-4.1 * rate**-0.21 * diameter)  # Marshall and Palmer 1948
-    efficiency = [backscatter_efficiency(math.pi * d / wavelength, water) for d in diameter]
-    expected = (
-        np.trapezoid(np.array(efficiency) * math.pi / 4 * diameter**2 * number, diameter) * 1e-6
-    )
-    assert volume_reflectivity(np.array(rate)) == pytest.approx(expected, rel=0.02)
-
-
 def test_the_echo_of_a_plate_is_in_proportion_to_its_area_at_any_distance() -> None:
     per_area = 10 ** (ECHO_PER_AREA[TrackClass.TARGET] / 10)
     for x, width in ((15, 1), (15, 2), (40, 2), (80, 4)):
         echo, _ = surface_echoes(Track.of([plate(x, width)]), Radar())
         assert echo.sum() == pytest.approx(per_area * width**2, rel=0.15)
         assert echo[TrackClass.TARGET].sum() == echo.sum()
-
-
-def test_a_car_returns_more_than_a_bike_and_a_bike_more_than_a_pedestrian() -> None:
-    strengths = []
-    for make in (objects.pedestrian, objects.bike, objects.car):
-        things = [make(np.random.default_rng(seed)).placed(20, 0) for seed in range(3)]
-        echoes = [surface_echoes(Track.of([thing]), Radar())[0].sum() for thing in things]
-        strengths.append(10 * np.log10(np.mean(echoes)))
-    assert strengths == sorted(strengths)
-    assert strengths == pytest.approx([-9, -3, 10], abs=5)
 
 
 def test_an_echo_lies_in_the_cell_that_its_surface_lies_in() -> None:
@@ -210,16 +164,10 @@ def test_a_frame_of_a_street_has_hundreds_of_detections_and_hardly_any_rain() ->
     rainy, dry = frames(track, Radar(), 15, SprinkledRain(50)), frames(track, Radar(), 15)
     for scan in [*rainy, *dry]:
         assert 100 < len(scan) < 500
-        assert scan.valid.all()
-        assert {name: values.dtype for name, values in scan.fields.items()} == dict.fromkeys(
-            ["x", "y", "z", "doppler", "rcs"], np.dtype(np.float32)
-        )
+        assert list(scan.fields) == ["x", "y", "z", "doppler", "rcs"]
+        assert {values.dtype for values in scan.fields.values()} == {np.dtype(np.float32)}
         assert np.array_equal(np.stack([scan.fields[axis] for axis in "xyz"], axis=1), scan.xyz)
-        assert np.isfinite(scan.fields["rcs"]).all()
     assert 0 < (labels(rainy) == TrackClass.RAIN).mean() < 0.01
     assert len(labels(rainy)) > 0.9 * len(labels(dry))
-    assert not (labels(dry) == TrackClass.RAIN).any()
-    assert {TrackClass.BACKGROUND, TrackClass.CAR} < set(labels(rainy))
-    again = frames(track, Radar(), 1)[0]
-    assert np.array_equal(again.xyz, dry[0].xyz)
+    assert {TrackClass.BACKGROUND, TrackClass.CAR} < set(labels(dry)) < set(TrackClass)
     assert not np.array_equal(dry[1].xyz[:100], dry[0].xyz[:100])

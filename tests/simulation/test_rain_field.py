@@ -1,4 +1,4 @@
-"""Rain over the ground: even, and as measured in the facility."""
+"""Rain over the ground, even and as measured in the facility, its drops, and the weather."""
 
 import math
 
@@ -6,13 +6,54 @@ import numpy as np
 import pytest
 
 from derain.errors import InputError
-from derain.simulation.rain_field import RainField, SprinkledRain, UniformRain
+from derain.simulation.radar import volume_reflectivity
+from derain.simulation.rain_field import (
+    INTERCEPT,
+    RainField,
+    SprinkledRain,
+    UniformRain,
+    drops_per_cubic_metre,
+    extinction,
+    slope,
+)
+from derain.simulation.scene import STRONGEST_WIND, draw_wind, weather_record
 
 
-def test_even_rain_is_the_same_everywhere() -> None:
-    x, y = np.meshgrid(np.linspace(-100, 100, 11), np.linspace(-50, 50, 7))
-    assert np.array_equal(UniformRain(25).rate(x, y), np.full_like(x, 25))
-    assert UniformRain(25).heaviest == 25
+@pytest.mark.parametrize(
+    ("rate", "steepness", "density", "share_per_metre", "visibility"),
+    [
+        (10.0, 2.5280, 894.0, 1.556e-3, 2514),
+        (25.0, 2.0855, 1352.1, 2.771e-3, 1412),
+        (50.0, 1.8030, 1801.1, 4.288e-3, 912),
+    ],
+)
+def test_rain_has_marshall_and_palmers_drops_and_takes_light_and_sight_by_their_cross_sections(
+    rate: float, steepness: float, density: float, share_per_metre: float, visibility: float
+) -> None:
+    assert slope(rate) == pytest.approx(steepness, abs=5e-5)
+    assert drops_per_cubic_metre(rate) == pytest.approx(density, abs=0.05)
+    assert extinction(rate) == pytest.approx(share_per_metre, abs=5e-7)
+    diameter = np.linspace(0, 40, 400_001)
+    number = INTERCEPT * np.exp(-steepness * diameter)
+    cross_section = 1e-6 * np.pi / 4 * diameter**2  # m²
+    area = np.trapezoid(cross_section * number, diameter)
+    assert extinction(rate) == pytest.approx(2 * area, rel=1e-3)
+    assert volume_reflectivity(np.array(rate)) == pytest.approx(0.9 * area, rel=1e-3)
+    weather = weather_record(rate, 9.0, (0.0, 2.0))
+    water = np.cumsum(diameter**3 * number)
+    median = diameter[np.searchsorted(water, water[-1] / 2)]
+    assert weather["median_volume_diameter_mm"] == pytest.approx(median, 1e-3)
+    assert weather["visibility_m"] == pytest.approx(visibility, rel=1e-3)  # Koschmieder's
+    assert (weather["wind_speed_m_s"], weather["wind_direction_deg"]) == (2.0, 90.0)
+    assert (UniformRain(rate).rate(diameter, diameter) == UniformRain(rate).heaviest).all()
+
+
+def test_clear_air_has_no_drops_and_no_end_to_its_visibility_and_winds_are_weak() -> None:
+    clear = weather_record(0.0, 0.0, (0, 0))
+    assert clear["median_volume_diameter_mm"] == 0
+    assert clear["drop_slope_per_mm"] == clear["visibility_m"] == math.inf
+    winds = [draw_wind(np.random.default_rng(seed)) for seed in range(50)]
+    assert 0.9 * STRONGEST_WIND < np.abs(winds).max() <= STRONGEST_WIND
 
 
 @pytest.mark.parametrize(
@@ -49,15 +90,16 @@ def test_the_heaviest_rain_of_the_facility_falls_where_it_was_measured() -> None
         assert rain.rate(*peak) > 0.9 * rain.rate(x, np.full_like(x, place[1])).max()
 
 
-@pytest.mark.parametrize("rain", [UniformRain, SprinkledRain])
-@pytest.mark.parametrize("rate", [-1.0, 1e4, math.inf, math.nan])
-def test_a_rate_that_is_no_rain_rate_is_refused(rain: type[RainField], rate: float) -> None:
-    with pytest.raises(InputError, match="rain rate"):
-        rain(rate)  # type: ignore[call-arg]
-
-
-def test_sprinklers_that_are_off_or_an_impossible_wind_are_refused() -> None:
-    with pytest.raises(InputError, match="rain rate"):
-        SprinkledRain(0)
-    with pytest.raises(InputError, match="wind"):
-        SprinkledRain(10, wind=(math.inf, 0))
+@pytest.mark.parametrize(
+    ("rain", "given", "named"),
+    [
+        *((UniformRain, (rate,), "rain rate") for rate in (-1.0, 1e4, math.inf, math.nan)),
+        *((SprinkledRain, (rate,), "rain rate") for rate in (0.0, 1e4, math.nan)),
+        (SprinkledRain, (10, (math.inf, 0)), "wind"),
+    ],
+)
+def test_impossible_rain_or_wind_is_refused(
+    rain: type[RainField], given: tuple[object, ...], named: str
+) -> None:
+    with pytest.raises(InputError, match=named):
+        rain(*given)

@@ -98,26 +98,10 @@ def test_unreturned_beams_look_where_nothing_returned_and_follow_a_return_of_the
 
 
 def rosette(shots: int, about: float = 0.0) -> Floats:
-    """Unit vectors of a sensor that looks through two turning prisms, as Livox's do.
-
-    Each prism bends the beam by as much, in a direction that turns with it, so that the beams draw
-    a rosette in a circle of FIELD_OF_VIEW around the azimuth ``about``, degrees.
-    """
-    first, second = (2 * np.pi * turns * np.arange(shots) / shots for turns in (12.157, -7.773))
-    left = FIELD_OF_VIEW / 4 * (np.cos(first) + np.cos(second))
-    up = FIELD_OF_VIEW / 4 * (np.sin(first) + np.sin(second))
-    off_axis = np.radians(np.hypot(left, up))
-    side = np.arctan2(up, left)
-    forward, across = np.cos(off_axis), np.sin(off_axis) * np.cos(side)
-    turn = np.radians(about)
-    return np.stack(
-        [
-            forward * np.cos(turn) - across * np.sin(turn),
-            forward * np.sin(turn) + across * np.cos(turn),
-            np.sin(off_axis) * np.sin(side),
-        ],
-        axis=1,
-    )
+    """Unit vectors of a sensor that fills a circle around an azimuth in degrees with a rosette."""
+    half = FIELD_OF_VIEW / 2
+    field = {"azimuth": (about - half, about + half), "inclination": (-half, half)}
+    return Sensor(pattern="rosette", rows=1, columns=shots, **field).beams()
 
 
 def off_axis(direction: Floats, about: float) -> Floats:

@@ -7,58 +7,41 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.random import Generator
 
 from derain.errors import InputError
-from derain.simulation.sensor import SELDOM_STATED, Returns, Sensor, load_sensor, packaged_sensors
+from derain.simulation.arrays import Floats
+from derain.simulation.sensor import SELDOM_STATED, Sensor, load_sensor, packaged_sensors
 
-from .surfaces import surfaces
+from .surfaces import random_surfaces, surfaces
 
 SENSOR = Sensor(rows=20, columns=50)
 BEAMS = SENSOR.rows * SENSOR.columns
 
 
-def returns(generator: Generator) -> Returns:
-    seen = generator.random(BEAMS) < 0.8
-    return Returns(
-        np.where(seen, generator.uniform(2, 100, BEAMS), SENSOR.maximum_range),
-        np.where(seen, generator.uniform(0.01, 1, BEAMS), 0),
-        np.where(seen, generator.integers(0, 8, BEAMS), 0),
-        np.arange(BEAMS),
-    )
-
-
-def test_beams_are_unit_vectors_over_the_field_of_view_from_top_left_to_bottom_right() -> None:
-    beams = SENSOR.beams()
-    assert beams.shape == (BEAMS, 3)
-    assert np.allclose(np.linalg.norm(beams, axis=1), 1)
-    azimuth = np.degrees(np.arctan2(beams[:, 1], beams[:, 0])).reshape(SENSOR.rows, -1)
-    inclination = np.degrees(np.arcsin(beams[:, 2])).reshape(SENSOR.rows, -1)
-    assert np.allclose(azimuth, np.linspace(57.5, -57.5, SENSOR.columns))
-    assert np.allclose(inclination, np.linspace(7.5, -17.5, SENSOR.rows)[:, None])
+def angles(sensor: Sensor) -> tuple[Floats, Floats]:
+    """Azimuths and inclinations of its beams, degrees, float64 (rows, columns) each."""
+    x, y, z = sensor.beams().T
+    shape = sensor.rows, sensor.columns
+    return np.degrees(np.arctan2(y, x)).reshape(shape), np.degrees(np.arcsin(z)).reshape(shape)
 
 
 def test_rows_and_columns_lie_where_they_are_stated_and_no_direction_comes_twice() -> None:
-    sensor = replace(
-        SENSOR,
-        azimuth=(-180, 180),
-        rows=3,
-        columns=8,
-        row_inclinations=(5.0, 0.0, -12.0),
-        row_azimuths=(0.0, 2.5, -1.0),
-    )
-    x, y, z = sensor.beams().T
-    azimuth = np.degrees(np.arctan2(y, x)).reshape(3, 8)
+    assert np.allclose(np.linalg.norm(SENSOR.beams(), axis=1), 1)
+    azimuth, inclination = angles(SENSOR)
+    assert np.allclose(azimuth, np.linspace(57.5, -57.5, SENSOR.columns))
+    assert np.allclose(inclination, np.linspace(7.5, -17.5, SENSOR.rows)[:, None])
+    tables = {"row_inclinations": (5.0, 0.0, -12.0), "row_azimuths": (0.0, 2.5, -1.0)}
+    sensor = replace(SENSOR, azimuth=(-180, 180), rows=3, columns=8, **tables)
+    azimuth, inclination = angles(sensor)
     expected = 180 - 45 * np.arange(8) + np.array(sensor.row_azimuths)[:, None]
     assert np.allclose((azimuth - expected + 180) % 360, 180)
-    inclination = np.degrees(np.arcsin(z)).reshape(3, 8)
     assert np.allclose(inclination, np.array(sensor.row_inclinations)[:, None])
 
 
 def test_a_sensor_that_pitches_looks_down_ahead_and_one_that_rolls_looks_up_to_its_left() -> None:
     level = replace(SENSOR, azimuth=(0, 90), inclination=(0, 10), rows=2, columns=2)
-    pitched = np.degrees(np.arcsin(replace(level, tilt=(0, 20)).beams()[:, 2])).reshape(2, 2)
-    rolled = np.degrees(np.arcsin(replace(level, tilt=(5, 0)).beams()[:, 2])).reshape(2, 2)
+    _, pitched = angles(replace(level, tilt=(0, 20)))
+    _, rolled = angles(replace(level, tilt=(5, 0)))
     assert np.allclose(pitched[:, 1], (-10, -20))  # straight ahead
     assert np.allclose(rolled[:, 0], (15, 5))  # to the left
     assert np.allclose(pitched[1, 0], 0)  # along the axis that it turns about
@@ -67,7 +50,7 @@ def test_a_sensor_that_pitches_looks_down_ahead_and_one_that_rolls_looks_up_to_i
 
 def test_a_tilted_sensor_reports_in_its_own_frame() -> None:
     tilted = replace(SENSOR, tilt=(3.0, -8.0))
-    given = returns(np.random.default_rng(1))
+    given = random_surfaces(BEAMS, np.random.default_rng(1))
     own = tilted.measure(given, np.random.default_rng(2))
     assert (own.xyz == SENSOR.measure(given, np.random.default_rng(2)).xyz).all()
     direction = own.xyz / np.linalg.norm(own.xyz, axis=1, keepdims=True)
@@ -76,18 +59,11 @@ def test_a_tilted_sensor_reports_in_its_own_frame() -> None:
 
 
 def test_the_shots_of_a_rosette_fill_its_ellipse_and_no_more() -> None:
-    sensor = Sensor(
-        pattern="rosette",
-        prism_turns=(42.1, -27.3),
-        azimuth=(-30, 30),
-        inclination=(-15, 25),
-        rows=1,
-        columns=20_000,
-    )
-    beams = sensor.beams()
-    assert np.allclose(np.linalg.norm(beams, axis=1), 1)
-    across = np.degrees(np.arctan2(beams[:, 1], beams[:, 0])) / 30
-    up = (np.degrees(np.arcsin(beams[:, 2])) - 5) / 20
+    field = {"azimuth": (-30, 30), "inclination": (-15, 25)}
+    turns = (42.1, -27.3)
+    sensor = Sensor(pattern="rosette", prism_turns=turns, rows=1, columns=20_000, **field)
+    (azimuth,), (inclination,) = angles(sensor)
+    across, up = azimuth / 30, (inclination - 5) / 20
     radius = np.hypot(across, up)
     assert radius.max() == pytest.approx(1)
     # Within the ellipse there is a shot near every place.
@@ -102,8 +78,7 @@ def test_lasers_of_a_rosette_share_a_curve_or_lie_beside_each_other() -> None:
     together = replace(rosette, rows=3, columns=200).beams().reshape(3, 200, 3)
     assert np.allclose(together.swapaxes(0, 1).reshape(-1, 3), alone)
     offsets = (0.4, 0.0, -0.4)
-    apart = replace(rosette, rows=3, columns=200, row_inclinations=offsets).beams()
-    inclination = np.degrees(np.arcsin(apart[:, 2])).reshape(3, 200)
+    _, inclination = angles(replace(rosette, rows=3, columns=200, row_inclinations=offsets))
     assert np.allclose(inclination - inclination[1], np.array(offsets)[:, None])
 
 
@@ -135,7 +110,7 @@ def test_the_encoder_turns_all_of_a_column_alike() -> None:
 
 def test_a_scan_holds_the_beams_that_returned_in_their_order_with_noise_as_stated() -> None:
     generator = np.random.default_rng(3)
-    given = returns(generator)
+    given = random_surfaces(BEAMS, generator)
     seen = given.returned
     error, ratio = [], []
     for _ in range(50):
@@ -153,15 +128,13 @@ def test_a_scan_holds_the_beams_that_returned_in_their_order_with_noise_as_state
     assert np.std(np.array(ratio)[:, grey]) == pytest.approx(SENSOR.intensity_noise, rel=0.05)
 
 
-def test_intensity_stays_within_its_scale_and_two_returns_of_a_beam_lie_along_it() -> None:
-    beam = np.repeat(np.arange(BEAMS), 2)
-    distance, reflectivity = np.tile([5.0, 60.0], BEAMS), np.tile([1e-4, 1.0], BEAMS)
-    extreme = Returns(distance, reflectivity, np.zeros(2 * BEAMS, int), beam)
+def test_intensity_stays_within_its_scale() -> None:
+    extreme = surfaces(BEAMS, 5.0, 1e-4)
+    extreme.reflectivity[::2] = 1.0
     scan = SENSOR.measure(extreme, np.random.default_rng(4))
     assert scan.intensity.min() == 0
     assert scan.intensity.max() == 255
     assert scan.intensity.dtype == scan.xyz.dtype == np.float32
-    assert np.allclose(scan.xyz / scan.range[:, None], SENSOR.beams()[beam], atol=1e-6)
 
 
 def test_every_packaged_sensor_is_written_out_in_full_and_survives_json(tmp_path: Path) -> None:

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from derain.files import read_scan
 from derain.files.extrinsics import read_extrinsics
 from derain.files.labels import instance, read_labels, semantic
 from derain.simulation.campaign import Campaign, Drive
@@ -94,18 +93,6 @@ def test_a_merged_cloud_is_the_scan_and_the_radar_frame_nearest_in_time(folder: 
         assert np.array_equal(merged[len(scan) :, 3], frame[:, 3])
         label = read_labels(folder / f"lidar_radar_labels/{number:06d}.label", len(merged))
         assert set(label) <= set(TrackClass)
-
-
-def test_the_radar_sees_what_the_lidar_sees(folder: Path) -> None:
-    # Masts are tall and echo well: what the radar calls a mast is beside one of the LiDAR's.
-    scan = read_scan(folder / "lidar_radar_pcd/000000.bin")
-    label = read_labels(folder / "lidar_radar_labels/000000.label", len(scan))
-    first = len(points(folder / "innoviz/000000.bin"))
-    mast = label == TrackClass.SPRINKLER
-    of_radar, of_lidar = scan.xyz[first:][mast[first:]], scan.xyz[:first][mast[:first]]
-    nearest = np.linalg.norm(of_radar[:, None, :2] - of_lidar[:, :2], axis=2).min(axis=1)
-    assert len(of_radar) > 5
-    assert np.median(nearest) < 1
 
 
 def test_the_extended_radar_has_the_same_points_and_what_was_measured_of_them(folder: Path) -> None:

@@ -2,15 +2,16 @@
 
 import math
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.random import Generator
 
 from derain.errors import InputError
 from derain.files.documents import Entry
-from derain.simulation.drawing import Span, draw_name
-from derain.simulation.settings import Settings
+from derain.files.packaged import packaged
+from derain.simulation.drawing import Span, pick
+from derain.simulation.settings import Positive, Settings, Share
 
 # How the density of particles varies in space, see :class:`derain.simulation.flying.regions.Gusts`.
 GustForm = Literal["even", "gusts", "sheets", "filaments"]
@@ -63,10 +64,11 @@ class Precipitation(Settings):
         InputError: A value that no precipitation can have.
     """
 
+    SUBJECT = "precipitation"
     kind: str = "none"
     number: float = 0.0
-    diameter: float = 1.0
-    shape: float = 1.0
+    diameter: Positive = 1.0
+    shape: Positive = 1.0
     largest: float = 6.0
     reflectivity: float = 0.5
     flicker: float = 0.0
@@ -77,47 +79,46 @@ class Precipitation(Settings):
     crowding: float = math.inf
     jitter: float = 0.0
     gust_form: GustForm = "even"
-    gust_length: float = 5.0
+    gust_length: Positive = 5.0
     gust_contrast: float = 2.0
     gust_seed: int = 0
     drift: float = 0.0
-    drift_height: float = 0.2
+    drift_height: Positive = 0.2
     plumes: int = 0
     plume_number: float = 0.0
-    plume_length: float = 5.0
-    haze: float = 0.0
-    haze_depth: float = 2.0
+    plume_length: Positive = 5.0
+    haze: Share = 0.0
+    haze_depth: Positive = 2.0
     haze_strength: float = 10.0
     haze_patches: float = 0.0
 
-    def __post_init__(self) -> None:
-        positive = "diameter", "shape", "gust_length", "drift_height", "plume_length", "haze_depth"
-        possible = {name: 0 < getattr(self, name) < math.inf for name in positive}
-        possible |= {
+    def _possible(self) -> dict[str, bool]:
+        return {
             "largest": SMALLEST < self.largest <= LARGEST,
             "reflectivity": 0 < self.reflectivity <= 1,
             "flicker": 0 <= self.flicker < 1,
             "spill": 1 <= self.spill < math.inf,
             "cut_off": self.cut_off > 0,
             "crowding": self.crowding > 0,
-            "gust_form": self.gust_form in get_args(GustForm),
-            "haze": 0 <= self.haze <= 1,
             "haze_strength": 1 <= self.haze_strength < math.inf,
         }
-        self._refuse_impossible("precipitation", possible)
 
 
 # How the density varies where it does.
 UNEVEN: tuple[GustForm, ...] = ("gusts", "sheets", "filaments")
 
-# Attributes that are log-uniform, since they span decades; the others are uniform.
-LOGARITHMIC = frozenset(
-    {"number", "diameter", "reach", "crowding", "gust_length"}
-    | {"drift", "plume_number", "haze", "haze_depth", "haze_strength"}
-)
-
-# No attribute is drawn from more.
+# No attribute that spans decades is drawn from more.
 GREATEST = 1e9
+
+
+def is_span_of_decades(span: Span) -> bool:
+    """Whether a number can be drawn from a span evenly in its logarithm, or is always 0."""
+    low, high = span
+    return (low > 0 or high == 0) and low <= high <= GREATEST
+
+
+# A span of decades, which a number is drawn from evenly in its logarithm; any other Span is even.
+Decades = Annotated[Span, is_span_of_decades]
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,7 @@ class Kind(Settings):
     """A kind of precipitation: attributes of :class:`Precipitation` by (lowest, highest).
 
     Attributes with ``_chance`` are probabilities that something is there at all. All defaults are
-    modelling choices around the sources that KINDS names; none of them was chosen by a label.
+    modelling choices around the sources that kinds.yaml names; none of them was chosen by a label.
 
     Attributes:
         weight: How often it is drawn, over the weights of the other kinds; 0 is never.
@@ -162,58 +163,46 @@ class Kind(Settings):
         InputError: A span that is none, or a chance that is not within 0 and 1.
     """
 
+    SUBJECT = "precipitation"
     weight: float = 1.0
-    number: Span = (1.0, 1000.0)
-    diameter: Span = (0.5, 2.0)
+    number: Decades = (1.0, 1000.0)
+    diameter: Decades = (0.5, 2.0)
     shape: Span = (1.0, 3.0)
     largest: Span = (4.0, 8.0)
     reflectivity: Span = (0.02, 0.1)
     flicker: Span = (0.0, 0.9)
     spill: Span = (1.0, 2.0)
-    reach_chance: float = 0.5
-    reach: Span = (5.0, 30.0)
+    reach_chance: Share = 0.5
+    reach: Decades = (5.0, 30.0)
     nearest: Span = (1.0, 3.0)
-    cut_off_chance: float = 0.2
+    cut_off_chance: Share = 0.2
     cut_off: Span = (10.0, 80.0)
-    crowding: Span = (0.005, 0.6)
+    crowding: Decades = (0.005, 0.6)
     jitter: Span = (0.0, 0.1)
-    gust_chance: float = 0.5
-    gust_length: Span = (0.5, 30.0)
+    gust_chance: Share = 0.5
+    gust_length: Decades = (0.5, 30.0)
     gust_contrast: Span = (0.5, 3.0)
-    drift_chance: float = 0.0
-    drift: Span = (1.0, 10.0)
+    drift_chance: Share = 0.0
+    drift: Decades = (1.0, 10.0)
     drift_height: Span = (0.05, 0.5)
-    plume_chance: float = 0.0
-    plume_number: Span = (300.0, 30000.0)
+    plume_chance: Share = 0.0
+    plume_number: Decades = (300.0, 30000.0)
     plume_length: Span = (1.0, 8.0)
-    haze_chance: float = 0.1
-    haze: Span = (0.001, 0.1)
-    haze_depth: Span = (0.3, 8.0)
-    haze_strength: Span = (2.0, 1000.0)
+    haze_chance: Share = 0.1
+    haze: Decades = (0.001, 0.1)
+    haze_depth: Decades = (0.3, 8.0)
+    haze_strength: Decades = (2.0, 1000.0)
     haze_patches: Span = (0.0, 3.0)
 
     def __post_init__(self) -> None:
-        spans = self._spans()
         for end in (0, 1):
-            ends: dict[str, Any] = {name: span[end] for name, span in spans.items()}
+            ends: dict[str, Any] = {name: getattr(self, name)[end] for name in SPANS}
             Precipitation(**ends)
-        possible = {}
-        for name, (low, high) in spans.items():
-            # Of a kind of which nothing falls the number is 0 and 0.
-            positive = name not in LOGARITHMIC or low > 0 or high == 0
-            possible[name] = positive and low <= high <= GREATEST
-        for one in fields(self):
-            if one.name.endswith("_chance"):
-                possible[one.name] = 0 <= getattr(self, one.name) <= 1
-        self._refuse_impossible("precipitation", possible)
-
-    def _spans(self) -> dict[str, Span]:
-        """What is drawn from a span, in order."""
-        return {name: value for name, value in vars(self).items() if isinstance(value, tuple)}
+        super().__post_init__()
 
     def draw(self, name: str, generator: Generator) -> Precipitation:
         """Draws precipitation of this kind."""
-        drawn = {name: _drawn(name, span, generator) for name, span in self._spans().items()}
+        drawn = {name: self._draw(name, generator) for name in SPANS}
         chances = (
             *(self.reach_chance, self.cut_off_chance, self.gust_chance),
             *(self.drift_chance, self.plume_chance, self.haze_chance),
@@ -233,66 +222,19 @@ class Kind(Settings):
             **drawn,
         )
 
+    def _draw(self, name: str, generator: Generator) -> float:
+        low, high = getattr(self, name)
+        share = generator.random()
+        if SPANS[name] == Decades and low > 0:
+            return float(np.clip(low * (high / low) ** share, low, high))
+        return float(np.clip(low + (high - low) * share, low, high))
 
-# Rain: numbers and sizes from drizzle to a cloudburst as Marshall and Palmer give them above .2 mm;
-# the reflectivity is from the Fresnel one of water to that of a drop that also returns light from
-# its inside. Snow: Gunn and Marshall's spectra have 10² to 10³ flakes per cubic metre, of .3 to
-# 1 mm melted, two to four times as wide unmelted at a density of .02 to .1; single aggregates have
-# centimetres. Snow scatters most of the light that meets it.
-# Source: Marshall and Palmer 1948; Gunn and Marshall 1958, N0 = 3.8e3 R^-.87 m⁻³ mm⁻¹, Λ = 2.55
-# R^-.48 mm⁻¹; Sekhon and Srivastava 1970, "Snow size spectra and radar reflectivity"; Warren 1982,
-# "Optical properties of snow"; Charron, Phillips and Waslander 2018 and Kurup and Bos 2021 for snow
-# that LiDARs see within 10 to 30 m.
-KINDS = {
-    "none": Kind(weight=2.0, number=(0.0, 0.0), haze_chance=0.0),
-    "drizzle": Kind(number=(300.0, 10000.0), diameter=(0.2, 0.5), largest=(0.8, 2.0)),
-    "rain": Kind(number=(30.0, 3000.0), plume_chance=0.3),
-    "snow": Kind(
-        weight=3.0,
-        number=(3.0, 3000.0),
-        diameter=(0.7, 4.0),
-        largest=(4.0, 20.0),
-        reflectivity=(0.1, 0.9),
-        spill=(1.0, 3.0),
-        reach=(5.0, 40.0),
-        crowding=(0.02, 1.5),
-        drift_chance=0.2,
-        plume_chance=0.1,
-    ),
-    "aggregates": Kind(
-        number=(0.1, 100.0),
-        diameter=(3.0, 12.0),
-        shape=(1.0, 4.0),
-        largest=(10.0, 30.0),
-        reflectivity=(0.1, 0.9),
-        spill=(1.0, 3.0),
-        reach=(10.0, 80.0),
-        crowding=(0.01, 0.6),
-    ),
-    "blizzard": Kind(
-        number=(300.0, 30000.0),
-        diameter=(0.3, 1.0),
-        largest=(2.0, 6.0),
-        reflectivity=(0.1, 0.9),
-        spill=(1.0, 3.0),
-        reach=(3.0, 30.0),
-        crowding=(0.1, 2.0),
-        gust_chance=0.9,
-        drift_chance=0.7,
-        haze_chance=0.3,
-    ),
-    "fog": Kind(weight=0.5, number=(0.0, 0.0), haze_chance=1.0),
-    "spray": Kind(
-        weight=0.5,
-        number=(0.0, 0.0),
-        diameter=(0.3, 1.0),
-        reach_chance=1.0,
-        reach=(8.0, 60.0),
-        plume_chance=1.0,
-        plume_number=(30.0, 3000.0),
-        haze_chance=0.3,
-    ),
-}
+
+# The attributes of a kind that are spans, in order, and their types.
+SPANS = {one.name: one.type for one in fields(Kind) if one.type in (Span, Decades)}
+
+# The kinds that there are, by name.
+KINDS = Entry.of_yaml(packaged("derain.simulation.flying")["kinds"]).each(Kind.of)
 
 
 @dataclass(frozen=True)
@@ -331,14 +273,5 @@ class PrecipitationSpans:
 
     def draw(self, generator: Generator) -> Precipitation:
         """Draws a kind of precipitation by the weights, and then its numbers from their spans."""
-        kinds = dict(self.kinds)
-        name = draw_name({name: kind.weight for name, kind in self.kinds}, generator)
-        return kinds[name].draw(name, generator)
-
-
-def _drawn(name: str, span: Span, generator: Generator) -> float:
-    low, high = span
-    share = generator.random()
-    if name in LOGARITHMIC and low > 0:
-        return float(np.clip(low * (high / low) ** share, low, high))
-    return float(np.clip(low + (high - low) * share, low, high))
+        name, kind = pick({named: named[1].weight for named in self.kinds}, generator)
+        return kind.draw(name, generator)

@@ -8,17 +8,7 @@ from numpy.random import Generator
 from derain.simulation import objects
 from derain.simulation.arrays import Floats, Ints
 from derain.simulation.objects import Options, Piece, Surface
-from derain.simulation.places import frames, heaps, people, plants, relief, threads, vehicles, walls
-from derain.simulation.places.crowd import ragged_things
-from derain.simulation.places.placing import (
-    assemble,
-    choose,
-    free_places,
-    line_up,
-    place,
-    scatter,
-    shuffled,
-)
+from derain.simulation.places import ground, openwork, placing, plants, road_users, walls
 from derain.simulation.track import Track
 
 # Rows of lots on either side of lanes, metres: how long a lot is, how wide, and a lane.
@@ -42,10 +32,10 @@ def lay_out_car_park(generator: Generator) -> Track:
         *_people(aside, generator),
         *_between(aside, winter, generator),
         *_edge(winter, generator),
-        *ragged_things(generator, _far_off, count=(3, 10), leafy=not winter),
+        *placing.ragged_things(generator, _far_off, count=(3, 10), leafy=not winter),
     ]
-    uneven = relief.Relief.draw(generator.uniform(0.01, 0.12), generator)
-    return assemble(_ground(winter, generator), standing, uneven, generator)
+    uneven = ground.Relief.draw(generator.uniform(0.01, 0.12), generator)
+    return placing.assemble(_ground(winter, generator), standing, uneven, generator)
 
 
 def _far_off(x: float, y: float) -> bool:
@@ -53,13 +43,13 @@ def _far_off(x: float, y: float) -> bool:
 
 
 def _ground(winter: bool, generator: Generator) -> Iterator[Surface]:
-    surface = [relief.ASPHALT, relief.COBBLES, relief.TRACK][generator.choice(3, p=[0.6, 0.3, 0.1])]
-    beyond = relief.SNOW if winter and generator.random() < 0.5 else relief.MEADOW
+    surface = [ground.ASPHALT, ground.COBBLES, ground.TRACK][generator.choice(3, p=[0.6, 0.3, 0.1])]
+    beyond = ground.SNOW if winter and generator.random() < 0.5 else ground.MEADOW
 
     def kind_at(x: Floats, y: Floats) -> Ints:
         return np.where(np.maximum(np.abs(x), np.abs(y)) < HALF_SIZE, 0, 1)
 
-    yield from relief.ground_mesh([surface, beyond], kind_at, generator)
+    yield from ground.ground_mesh([surface, beyond], kind_at, generator)
 
 
 def _rows(aside: float, generator: Generator) -> Iterator[Surface]:
@@ -72,10 +62,10 @@ def _rows(aside: float, generator: Generator) -> Iterator[Surface]:
         for x in np.arange(-HALF_SIZE + 4, HALF_SIZE - 4, LOT_WIDTH):
             if generator.random() < full and np.hypot(x, y) > 4.5:
                 near = np.hypot(x, y) < 25
-                make = vehicles.glazed_car if near else objects.car
+                make = road_users.glazed_car if near else objects.car
                 heading = np.pi / 2 * generator.choice([-1, 1]) + generator.normal(0, 0.04)
                 nudged = x + generator.normal(0, 0.12), y + generator.normal(0, 0.25)
-                yield from place(make(generator), *nudged, heading)
+                yield from placing.place(make(generator), *nudged, heading)
 
 
 def _people(aside: float, generator: Generator) -> Iterator[Surface]:
@@ -87,57 +77,59 @@ def _people(aside: float, generator: Generator) -> Iterator[Surface]:
         return max(abs(x), abs(y)) < HALF_SIZE and across < LANE / 2 + 0.8
 
     for count, distances in (((6, 16), (2.2, 35)), (6, (15, 50))):
-        makes = choose([(people.person, 8), (people.cyclist, 1)], count, generator)
-        places = free_places(len(makes), distances, 0.9, generator, in_a_lane)
-        yield from scatter(makes, places, generator)
+        makes = placing.choose([(road_users.person, 8), (road_users.cyclist, 1)], count, generator)
+        places = placing.free_places(len(makes), distances, 0.9, generator, in_a_lane)
+        yield from placing.scatter(makes, places, generator)
 
 
 def _between(aside: float, winter: bool, generator: Generator) -> Iterator[Surface]:
     """What stands along the lane and where lots meet."""
     kinds: Options = [
-        (frames.trolley, 2),
-        (frames.bollard, 2),
-        (frames.thin_pole, 2),
+        (openwork.trolley, 2),
+        (openwork.bollard, 2),
+        (openwork.thin_pole, 2),
         (_sapling, 1),
     ]
-    small = shuffled(choose(kinds, (8, 25), generator), generator)
+    small = placing.shuffled(placing.choose(kinds, (8, 25), generator), generator)
 
     def at_its_edge(x: float, y: float) -> bool:
         return abs(x) < HALF_SIZE and abs(abs(y - aside) - LANE / 2 - 0.3) < 0.5
 
-    places = free_places(len(small), (2.2, 35), 0.5, generator, at_its_edge)
-    yield from scatter(small, places, generator)
+    places = placing.free_places(len(small), (2.2, 35), 0.5, generator, at_its_edge)
+    yield from placing.scatter(small, places, generator)
     for x in np.arange(-HALF_SIZE, HALF_SIZE, generator.uniform(10, 20)):
         y = aside + LANE / 2 + LOT_LENGTH + 0.15
-        yield from place(plants.tree(winter, generator), x, y)
+        yield from placing.place(plants.tree(winter, generator), x, y)
     if winter:
-        bank = heaps.bank(generator.uniform(4, 12), generator, snow=True)
+        bank = ground.bank(generator.uniform(4, 12), generator, snow=True)
         yield bank.placed(generator.uniform(3, 20), aside - LANE / 2 - 1)
 
 
 def _edge(winter: bool, generator: Generator) -> Iterator[Surface]:
     """What closes the car park off: on each of four sides a hedge, a fence, or houses."""
-    makes: list[Piece] = [threads.chain_link, frames.railing, _nets, walls.facade]
+    makes: list[Piece] = [openwork.chain_link, openwork.railing, _nets, walls.facade]
     makes.append(_brushes if winter else plants.hedge)
     for quarter in range(4):
         make = makes[generator.integers(len(makes))]
         piece = 19.0 if make is walls.facade else 9.5
-        for surface in line_up(make, HALF_SIZE, (-HALF_SIZE, HALF_SIZE), piece, generator, 0.15):
+        for surface in placing.line_up(
+            make, HALF_SIZE, (-HALF_SIZE, HALF_SIZE), piece, generator, 0.15
+        ):
             yield surface.placed(0, 0, quarter * np.pi / 2)
 
 
 def _nets(length: float, generator: Generator) -> Surface:
-    return threads.net(length, generator.uniform(1.5, 5), generator)
+    return openwork.net(length, generator.uniform(1.5, 5), generator)
 
 
 def _brushes(length: float, generator: Generator) -> Iterator[Surface]:
     for x in np.arange(0, length, 1.0):
-        yield from place(plants.brushwood(generator.uniform(0.8, 2), generator), x, 0)
+        yield from placing.place(plants.brushwood(generator.uniform(0.8, 2), generator), x, 0)
 
 
 def _sapling(generator: Generator) -> Iterable[Surface]:
     """A sapling tied to its stake."""
-    yield frames.thin_pole(generator)
+    yield openwork.thin_pole(generator)
     length, width, height = generator.uniform(0.2, 0.6, 3)
     leaves = plants.bush((length, width, height), generator)
     yield leaves.moved(0.1, 0, generator.uniform(0.8, 1.8))

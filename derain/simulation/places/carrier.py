@@ -13,9 +13,8 @@ from numpy.random import Generator
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
-from derain.simulation.drawing import Span, log_uniform
-from derain.simulation.objects import Surface
-from derain.simulation.places.specks import PAINT, mirrored
+from derain.simulation.drawing import Span, log_uniform, pick
+from derain.simulation.objects import PAINT, Surface, mirrored
 from derain.simulation.shapes import Point, Triangles, bars
 
 # Of how many specks a part is seen that returns nothing else.
@@ -50,8 +49,7 @@ def lay_out_carrier(generator: Generator, mounting_height: float) -> Iterator[Su
     if generator.random() < 0.2:
         return
     shares = CARRIERS_BY_HEIGHT[int(np.searchsorted([ON_A_CAR, ON_A_LORRY], mounting_height))]
-    carriers = list(shares)
-    carrier = carriers[generator.choice(len(carriers), p=list(shares.values()))]
+    carrier = pick(shares, generator)
     heading = generator.choice([0.0, generator.normal(0, 0.1), generator.uniform(-np.pi, np.pi)])
     painted = generator.choice(PAINTED)
     for part in carrier(generator, mounting_height):

@@ -9,17 +9,7 @@ from numpy.random import Generator
 from derain.simulation import objects
 from derain.simulation.drawing import along
 from derain.simulation.objects import Surface
-from derain.simulation.places import frames, people, plants, relief, threads, vehicles, walls
-from derain.simulation.places.crowd import ragged_things, users
-from derain.simulation.places.placing import (
-    assemble,
-    choose,
-    free_places,
-    line_up,
-    place,
-    scatter,
-    shuffled,
-)
+from derain.simulation.places import ground, openwork, placing, plants, road_users, walls
 from derain.simulation.track import Track
 
 CITY_SIGHT = (-60.0, 85.0)
@@ -65,33 +55,33 @@ def lay_out_city(generator: Generator) -> Track:
     standing = [
         *_houses(section, generator),
         *_parked(section, generator),
-        *users(generator, section.on_the_road, walkers=(2, 8), cars=(1, 5)),
+        *placing.users(generator, section.on_the_road, walkers=(2, 8), cars=(1, 5)),
         *_people(section, generator),
         *_furniture(section, winter, generator),
         *_works(section, generator),
-        *ragged_things(generator, section.on_a_pavement, count=(2, 12), leafy=not winter),
+        *placing.ragged_things(generator, section.on_a_pavement, count=(2, 12), leafy=not winter),
     ]
-    uneven = relief.Relief.draw(generator.uniform(0.01, 0.1), generator)
-    ground = _ground(section, generator)
-    return assemble(ground, standing, uneven, generator, _cables(section, generator))
+    uneven = ground.Relief.draw(generator.uniform(0.01, 0.1), generator)
+    over = _cables(section, generator)
+    return placing.assemble(_ground(section, generator), standing, uneven, generator, over)
 
 
 def _ground(section: Section, generator: Generator) -> Iterator[Surface]:
-    surface = relief.COBBLES if generator.random() < 0.25 else relief.ASPHALT
+    surface = ground.COBBLES if generator.random() < 0.25 else ground.ASPHALT
     right, left = section.kerbs
-    return relief.ground_mesh(
-        [surface, relief.PAVING], lambda x, y: np.where((y > right) & (y < left), 0, 1), generator
+    return ground.ground_mesh(
+        [surface, ground.PAVING], lambda x, y: np.where((y > right) & (y < left), 0, 1), generator
     )
 
 
 def _houses(section: Section, generator: Generator) -> Iterator[Surface]:
     for side, front in zip((-1, 1), section.fronts, strict=True):
         gaps, piece = generator.uniform(0, 0.3), generator.uniform(9, 18)
-        for house in line_up(walls.facade, abs(front), CITY_SIGHT, piece, generator, gaps):
+        for house in placing.line_up(walls.facade, abs(front), CITY_SIGHT, piece, generator, gaps):
             # Houses are seen from the street: those on the right are those on the left, turned.
             yield house if side > 0 else house.placed(CITY_SIGHT[0] + CITY_SIGHT[1], 0, np.pi)
     far = walls.facade(30, generator)
-    yield from place(far, CITY_SIGHT[1], 15, -np.pi / 2)
+    yield from placing.place(far, CITY_SIGHT[1], 15, -np.pi / 2)
 
 
 def _parked(section: Section, generator: Generator) -> Iterator[Surface]:
@@ -100,16 +90,16 @@ def _parked(section: Section, generator: Generator) -> Iterator[Surface]:
         for x in along(*CITY_SIGHT, (5.8, 7.5), generator):
             y = kerb - side * 1.1 + generator.normal(0, 0.08)
             if generator.random() < full and np.hypot(x, y) > 3.9:
-                make = vehicles.glazed_car if abs(x) < 30 else objects.car
+                make = road_users.glazed_car if abs(x) < 30 else objects.car
                 heading = generator.normal(0, 0.03) + np.pi * generator.integers(2)
-                yield from place(make(generator), x, y, heading)
+                yield from placing.place(make(generator), x, y, heading)
 
 
 def _people(section: Section, generator: Generator) -> Iterator[Surface]:
-    makes = choose([(people.person, 8), (people.cyclist, 2)], 18, generator)
+    makes = placing.choose([(road_users.person, 8), (road_users.cyclist, 2)], 18, generator)
     count = int(generator.integers(4, 18))
-    places = free_places(count, (2.5, 55), 0.8, generator, section.on_a_pavement)
-    yield from scatter(makes, places, generator)
+    places = placing.free_places(count, (2.5, 55), 0.8, generator, section.on_a_pavement)
+    yield from placing.scatter(makes, places, generator)
 
 
 def _furniture(section: Section, winter: bool, generator: Generator) -> Iterator[Surface]:
@@ -117,14 +107,14 @@ def _furniture(section: Section, winter: bool, generator: Generator) -> Iterator
     for kerb, side in zip(section.kerbs, (-1, 1), strict=True):
         for x in along(*CITY_SIGHT, (6, 30), generator):
             tree = plants.tree(winter, generator)
-            yield from place(tree, x, kerb + side * generator.uniform(0.5, 1))
-        makes = choose([(frames.thin_pole, 3), (frames.bollard, 2)], 40, generator)
-        mixed, places = shuffled(makes, generator), along(*CITY_SIGHT, (1, 7), generator)
+            yield from placing.place(tree, x, kerb + side * generator.uniform(0.5, 1))
+        makes = placing.choose([(openwork.thin_pole, 3), (openwork.bollard, 2)], 40, generator)
+        mixed, places = placing.shuffled(makes, generator), along(*CITY_SIGHT, (1, 7), generator)
         for make, x in zip(mixed, places, strict=False):
-            yield from place(make(generator), x, kerb + side * 0.35)
+            yield from placing.place(make(generator), x, kerb + side * 0.35)
         if generator.random() < 0.4:
             begin = generator.uniform(2, 20)
-            rail = frames.railing(generator.uniform(3, 12), generator)
+            rail = openwork.railing(generator.uniform(3, 12), generator)
             yield rail.placed(begin, kerb + side * 0.4)
 
 
@@ -134,9 +124,9 @@ def _works(section: Section, generator: Generator) -> Iterator[Surface]:
         side = int(generator.integers(2))
         length, x = generator.uniform(6, 15), generator.uniform(-5, 25)
         y = section.fronts[side] - (1.4 if side else -0.2)
-        yield from place(frames.scaffold(length, generator), x, y)
+        yield from placing.place(openwork.scaffold(length, generator), x, y)
         if generator.random() < 0.7:
-            veil = threads.net(length, generator.uniform(3, 6), generator)
+            veil = openwork.net(length, generator.uniform(3, 6), generator)
             yield veil.placed(x, y - 0.15 if side else y + 1.3)
 
 
@@ -146,7 +136,7 @@ def _cables(section: Section, generator: Generator) -> Iterator[Surface]:
         height = generator.uniform(5, 7)
         for x in along(*CITY_SIGHT, (12, 30), generator):
             start, end = (np.array([x, y, height + 0.5]) for y in section.fronts)
-            yield threads.cable(start, end, 0.4, (0.006, 0.02), generator)
+            yield openwork.cable(start, end, 0.4, (0.006, 0.02), generator)
         for y in generator.uniform(-2, 4, generator.integers(0, 3)):
             start, end = (np.array([x, y, height]) for x in CITY_SIGHT)
-            yield threads.cable(start, end, 0.3, (0.008, 0.02), generator)
+            yield openwork.cable(start, end, 0.3, (0.008, 0.02), generator)

@@ -10,9 +10,7 @@ from numpy.random import Generator
 from derain.simulation.arrays import Floats, Ints
 from derain.simulation.drawing import along
 from derain.simulation.objects import Surface
-from derain.simulation.places import frames, heaps, plants, relief, threads
-from derain.simulation.places.crowd import ragged_things, users
-from derain.simulation.places.placing import Line, assemble, line_up, place
+from derain.simulation.places import ground, openwork, placing, plants
 from derain.simulation.track import Track
 
 # How far what is beside the road goes on behind the sensor and ahead of it, metres.
@@ -33,7 +31,7 @@ class Road:
     bend: float
     half_width: float
 
-    def beside(self, side: int, outwards: float) -> Line:
+    def beside(self, side: int, outwards: float) -> placing.Line:
         """The line so many metres outwards from its left (1) or right edge."""
         return lambda x: self.aside + self.bend * x**2 + side * (self.half_width + outwards)
 
@@ -60,22 +58,22 @@ def lay_out_country(generator: Generator) -> Track:
     winter = generator.random() < 0.4
     snowy = winter and generator.random() < 0.5
     standing = [
-        *users(generator, walkers=(4, 12), cars=(2, 6)),
+        *placing.users(generator, walkers=(4, 12), cars=(2, 6)),
         *_verges(road, generator),
         *(thing for side in (-1, 1) for thing in _boundary(road, side, winter, snowy, generator)),
         *_trees(road, winter, generator),
         *_cables(road, generator),
-        *ragged_things(generator, road.beside_it, count=(10, 30), leafy=not winter),
+        *placing.ragged_things(generator, road.beside_it, count=(10, 30), leafy=not winter),
     ]
-    uneven = relief.Relief.draw(generator.uniform(0.05, 0.5), generator)
-    return assemble(_ground(road, snowy, generator), standing, uneven, generator)
+    uneven = ground.Relief.draw(generator.uniform(0.05, 0.5), generator)
+    return placing.assemble(_ground(road, snowy, generator), standing, uneven, generator)
 
 
 def _ground(road: Road, snowy: bool, generator: Generator) -> Iterator[Surface]:
-    surface = [relief.ASPHALT, relief.TRACK, relief.COBBLES][generator.choice(3, p=[0.6, 0.3, 0.1])]
-    fields = [relief.SNOW] if snowy else [relief.FIELD, relief.MEADOW, relief.GRAVEL]
+    surface = [ground.ASPHALT, ground.TRACK, ground.COBBLES][generator.choice(3, p=[0.6, 0.3, 0.1])]
+    fields = [ground.SNOW] if snowy else [ground.FIELD, ground.MEADOW, ground.GRAVEL]
     beyond = [fields[which] for which in generator.integers(len(fields), size=2)]
-    verge = relief.SNOW if snowy else relief.MEADOW
+    verge = ground.SNOW if snowy else ground.MEADOW
     broad = generator.uniform(1, 4)
 
     def kind_at(x: Floats, y: Floats) -> Ints:
@@ -83,7 +81,7 @@ def _ground(road: Road, snowy: bool, generator: Generator) -> Iterator[Surface]:
         field = np.where(y > road.aside + road.bend * x**2, 2, 3)
         return np.where(outside < 0, 0, np.where(outside < broad, 1, field))
 
-    yield from relief.ground_mesh([surface, verge, *beyond], kind_at, generator)
+    yield from ground.ground_mesh([surface, verge, *beyond], kind_at, generator)
 
 
 def _verges(road: Road, generator: Generator) -> Iterator[Surface]:
@@ -104,20 +102,20 @@ def _boundary(
     gaps = generator.uniform(0, 0.4)
     makes = {
         "hedge": _bare_hedge if winter else plants.hedge,
-        "wire": threads.wire_fence,
-        "mesh": threads.chain_link,
-        "bank": partial(heaps.bank, snow=snowy),
-        "rail": frames.guard_rail,
-        "gate": frames.railing,
+        "wire": openwork.wire_fence,
+        "mesh": openwork.chain_link,
+        "bank": partial(ground.bank, snow=snowy),
+        "rail": openwork.guard_rail,
+        "gate": openwork.railing,
     }
     make = makes[generator.choice(list(makes), p=[0.35, 0.2, 0.15, 0.15, 0.05, 0.1])]
-    return line_up(make, line, COUNTRY_SIGHT, generator.uniform(4, 9), generator, gaps)
+    return placing.line_up(make, line, COUNTRY_SIGHT, generator.uniform(4, 9), generator, gaps)
 
 
 def _bare_hedge(length: float, generator: Generator) -> Iterator[Surface]:
     height = generator.uniform(0.8, 2.5)
     for x in np.arange(0, length, 0.6):
-        yield from place(plants.brushwood(height, generator), x, 0)
+        yield from placing.place(plants.brushwood(height, generator), x, 0)
 
 
 def _trees(road: Road, winter: bool, generator: Generator) -> Iterator[Surface]:
@@ -125,7 +123,7 @@ def _trees(road: Road, winter: bool, generator: Generator) -> Iterator[Surface]:
         line, spacing = road.beside(side, generator.uniform(1.5, 10)), generator.uniform(6, 25)
         for x in along(*COUNTRY_SIGHT, (0.5 * spacing, spacing), generator):
             y = float(line(np.array(x))) + side * generator.uniform(0, 3)
-            yield from place(plants.tree(winter, generator), x, y, generator.uniform(0, 6))
+            yield from placing.place(plants.tree(winter, generator), x, y, generator.uniform(0, 6))
 
 
 def _cables(road: Road, generator: Generator) -> Iterator[Surface]:
@@ -136,8 +134,8 @@ def _cables(road: Road, generator: Generator) -> Iterator[Surface]:
     heads = np.column_stack([x, line(x), np.full_like(x, height)])
     feet = heads * (1, 1, 0)
     for foot, head in zip(feet, heads, strict=True):
-        yield threads.cable(foot, head, 0, (0.15, 0.3), generator)
+        yield openwork.cable(foot, head, 0, (0.15, 0.3), generator)
     for number in range(generator.integers(1, 5)):
         shift = np.array([0, 0.4 * (number % 2) - 0.2, -0.4 * (number // 2)])
         for start, end in zip(heads[:-1] + shift, heads[1:] + shift, strict=True):
-            yield threads.cable(start, end, generator.uniform(0.2, 1), (0.005, 0.03), generator)
+            yield openwork.cable(start, end, generator.uniform(0.2, 1), (0.005, 0.03), generator)

@@ -9,17 +9,8 @@ from numpy.random import Generator
 from derain.simulation import shapes
 from derain.simulation.drawing import log_uniform
 from derain.simulation.objects import Make, Options, Piece, Surface, of_size
-from derain.simulation.places import frames, heaps, people, plants, relief, threads, vehicles, walls
-from derain.simulation.places.placing import (
-    assemble,
-    choose,
-    free_places,
-    line_up,
-    place,
-    scatter,
-    shuffled,
-)
-from derain.simulation.places.shell import Walls
+from derain.simulation.places import ground, openwork, placing, plants, road_users, walls
+from derain.simulation.places.walls import Walls
 from derain.simulation.track import Track
 
 # What is above the sensor is higher than this, metres: sensors on a car's roof fit in.
@@ -48,11 +39,11 @@ def lay_out_garage(generator: Generator) -> Track:
         *_cages(hall, generator),
         *_under_the_ceiling(hall, generator),
     ]
-    floor = relief.ground_mesh(
-        [relief.CONCRETE], lambda x, y: np.zeros(np.shape(x), np.int64), generator
+    floor = ground.ground_mesh(
+        [ground.CONCRETE], lambda x, y: np.zeros(np.shape(x), np.int64), generator
     )
-    uneven = relief.Relief.draw(generator.uniform(0.003, 0.03), generator)
-    return assemble(floor, standing, uneven, generator, [_ceiling(hall, generator)])
+    uneven = ground.Relief.draw(generator.uniform(0.003, 0.03), generator)
+    return placing.assemble(floor, standing, uneven, generator, [_ceiling(hall, generator)])
 
 
 def _ceiling(hall: Walls, generator: Generator) -> Surface:
@@ -72,16 +63,16 @@ def _under_the_ceiling(hall: Walls, generator: Generator) -> Iterator[Surface]:
         else:
             x = generator.uniform(*hall.x)
             ends = (x, hall.y[0], top - drop), (x, hall.y[1], top - drop)
-        yield frames.made([shapes.bars([ends], radius, sides=6)], generator)
+        yield openwork.made([shapes.bars([ends], radius, sides=6)], generator)
     for _ in range(generator.integers(3, 15)):
         at = generator.uniform(*hall.x), generator.uniform(*hall.y)
         heading = generator.uniform(0, np.pi)
         lamp = shapes.box(1.2, 0.12, top - 0.2, top - 0.12, at, heading)
-        yield frames.made([lamp], generator)
+        yield openwork.made([lamp], generator)
     for _ in range(generator.integers(0, 8)):
         start = np.array([generator.uniform(*hall.x), generator.uniform(*hall.y), top])
         end = start + generator.uniform((-2, -2, 0), (2, 2, 0))
-        yield threads.cable(start, end, generator.uniform(0.1, 0.9), (0.004, 0.03), generator)
+        yield openwork.cable(start, end, generator.uniform(0.1, 0.9), (0.004, 0.03), generator)
 
 
 def _pillars(hall: Walls, generator: Generator) -> Iterator[Surface]:
@@ -94,7 +85,7 @@ def _pillars(hall: Walls, generator: Generator) -> Iterator[Surface]:
         if np.hypot(*at) > 2.6:
             box = shapes.box(side, side, 0, hall.height, at)
             pillar = shapes.cylinder(side / 2, 0, hall.height, at) if rounded else box
-            yield frames.made([pillar], generator)
+            yield openwork.made([pillar], generator)
 
 
 def _walls(hall: Walls, generator: Generator) -> Iterator[Surface]:
@@ -105,10 +96,10 @@ def _walls(hall: Walls, generator: Generator) -> Iterator[Surface]:
         sill = generator.uniform(0.3, 1.1) if is_open else hall.height
         wall = [walls.rough_wall(length, sill, generator, cell=0.3)]
         if is_open:
-            wall.append(frames.railing(length, generator))
+            wall.append(openwork.railing(length, generator))
             outside = plants.bush((0.5 * length, 1.5, 2.0), generator)
             wall.append(outside.placed(length / 2, -generator.uniform(3, 8)))
-        yield from place(wall, x, y, number * np.pi / 2)
+        yield from placing.place(wall, x, y, number * np.pi / 2)
 
 
 def _parked(hall: Walls, generator: Generator) -> Iterator[Surface]:
@@ -117,36 +108,38 @@ def _parked(hall: Walls, generator: Generator) -> Iterator[Surface]:
         for x in np.arange(hall.x[0] + 2, hall.x[1] - 2, 2.7):
             if generator.random() < full and np.hypot(x, y) > 4.3:
                 heading = nose * np.pi / 2 + generator.normal(0, 0.04)
-                yield from place(vehicles.glazed_car(generator), x, y, heading)
+                yield from placing.place(road_users.glazed_car(generator), x, y, heading)
 
 
 def _about(hall: Walls, generator: Generator) -> Iterator[Surface]:
     """People and small things on the floor."""
-    makes: list[Make] = [people.person] * int(generator.integers(3, 11))
+    makes: list[Make] = [road_users.person] * int(generator.integers(3, 11))
     small: Options = [
-        (people.cyclist, 1),
-        (frames.trolley, 2),
-        (frames.bollard, 1),
-        (frames.thin_pole, 3),
+        (road_users.cyclist, 1),
+        (openwork.trolley, 2),
+        (openwork.bollard, 1),
+        (openwork.thin_pole, 3),
         (of_size(plants.brushwood, (0.3, 1.2)), 1),
-        (heaps.logs, 0.4),
-        (of_size(heaps.rubble, (0.3, 1)), 1),
+        (ground.logs, 0.4),
+        (of_size(ground.rubble, (0.3, 1)), 1),
     ]
-    makes += choose(small, (5, 20), generator)
-    places = free_places(len(makes), (2.2, 30), 0.9, generator, hall.holds)
-    yield from scatter(shuffled(makes, generator), places, generator)
+    makes += placing.choose(small, (5, 20), generator)
+    places = placing.free_places(len(makes), (2.2, 30), 0.9, generator, hall.holds)
+    yield from placing.scatter(placing.shuffled(makes, generator), places, generator)
 
 
 def _cages(hall: Walls, generator: Generator) -> Iterator[Surface]:
     """Walls of mesh, nets and railings that part the hall."""
     kinds: list[Piece] = [
-        threads.chain_link,
-        frames.railing,
-        lambda length, drawn: threads.net(length, hall.height - 0.1, drawn),
-        frames.scaffold,
+        openwork.chain_link,
+        openwork.railing,
+        lambda length, drawn: openwork.net(length, hall.height - 0.1, drawn),
+        openwork.scaffold,
     ]
-    for x, y in free_places(int(generator.integers(2, 6)), (2.5, 20), 2.5, generator, hall.holds):
+    for x, y in placing.free_places(
+        int(generator.integers(2, 6)), (2.5, 20), 2.5, generator, hall.holds
+    ):
         make = kinds[generator.integers(len(kinds))]
         reach = min(generator.uniform(1.5, 7), hall.x[1] - x)
-        pieces = line_up(make, 0, (0, reach + 0.1), reach, generator)
-        yield from place(pieces, x, y)
+        pieces = placing.line_up(make, 0, (0, reach + 0.1), reach, generator)
+        yield from placing.place(pieces, x, y)

@@ -10,7 +10,7 @@ from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import log_uniform, log_uniforms
 from derain.simulation.objects import Surface, of_material
-from derain.simulation.places import frames, threads
+from derain.simulation.places import openwork
 from derain.simulation.places.placing import place
 from derain.simulation.shapes import Triangles
 
@@ -155,7 +155,7 @@ def _poles(away: float, generator: Generator) -> Iterator[Surface]:
     if generator.random() < 0.5:
         heads = np.column_stack([x, y, np.full(count, height)])
         for start, end in itertools.pairwise(heads):
-            yield threads.cable(start, end, generator.uniform(0.2, 1.5), (0.01, 0.06), generator)
+            yield openwork.cable(start, end, generator.uniform(0.2, 1.5), (0.01, 0.06), generator)
 
 
 def _pylons(away: float, generator: Generator) -> Iterator[Surface]:
@@ -163,12 +163,12 @@ def _pylons(away: float, generator: Generator) -> Iterator[Surface]:
     height, apart = generator.uniform(12, 40), generator.uniform(30, 120)
     heads = []
     for y in (-apart / 2, apart / 2):
-        yield frames.lattice((0, y, -DEPTH), (0, y, height), generator.uniform(0.6, 2), generator)
+        yield openwork.lattice((0, y, -DEPTH), (0, y, height), generator.uniform(0.6, 2), generator)
         arm = [((-4.0, y, height - 3), (4.0, y, height - 3))]
         yield of_material([shapes.bars(arm, 0.15)], HORIZON_REFLECTIVITY, generator)
         heads.append([(x, y, height - 3) for x in (-4.0, 0.0, 4.0)])
     for start, end in zip(*np.array(heads), strict=True):
-        yield threads.cable(start, end, 0.03 * apart, (0.015, 0.08), generator)
+        yield openwork.cable(start, end, 0.03 * apart, (0.015, 0.08), generator)
 
 
 def _sign(away: float, generator: Generator) -> Iterator[Surface]:

@@ -8,9 +8,7 @@ from numpy.random import Generator
 from derain.simulation import objects, shapes
 from derain.simulation.drawing import along
 from derain.simulation.objects import Make, Piece, Surface
-from derain.simulation.places import frames, heaps, people, plants, relief, threads, vehicles, walls
-from derain.simulation.places.crowd import ragged_things
-from derain.simulation.places.placing import assemble, free_places, line_up, place, scatter
+from derain.simulation.places import ground, openwork, placing, plants, road_users, walls
 from derain.simulation.track import Track
 
 MOTORWAY_SIGHT = (-80.0, 115.0)
@@ -35,24 +33,26 @@ def lay_out_motorway(generator: Generator) -> Track:
         *_breakdown(right, generator),
         *_beside((right, other), generator),
         *_embankments((right - 3, other + 3), generator),
-        *ragged_things(generator, lambda x, y: not right - 1 < y < other + 1.5, count=(5, 15)),
+        *placing.ragged_things(
+            generator, lambda x, y: not right - 1 < y < other + 1.5, count=(5, 15)
+        ),
     ]
-    uneven = relief.Relief.draw(generator.uniform(0.02, 0.15), generator)
+    uneven = ground.Relief.draw(generator.uniform(0.02, 0.15), generator)
     over = _gantries((right - 1, other + 1), generator)
-    return assemble(_ground(right, other, generator), standing, uneven, generator, over)
+    return placing.assemble(_ground(right, other, generator), standing, uneven, generator, over)
 
 
 def _ground(right: float, left: float, generator: Generator) -> Iterator[Surface]:
-    verge = [relief.MEADOW, relief.GRAVEL, relief.SNOW][generator.choice(3, p=[0.6, 0.25, 0.15])]
-    return relief.ground_mesh(
-        [relief.ASPHALT, verge], lambda x, y: np.where((y > right) & (y < left), 0, 1), generator
+    verge = [ground.MEADOW, ground.GRAVEL, ground.SNOW][generator.choice(3, p=[0.6, 0.25, 0.15])]
+    return ground.ground_mesh(
+        [ground.ASPHALT, verge], lambda x, y: np.where((y > right) & (y < left), 0, 1), generator
     )
 
 
 def _rails(lines: tuple[float, ...], generator: Generator) -> Iterator[Surface]:
     for y in lines:
-        make = frames.guard_rail if generator.random() < 0.7 else threads.wire_fence
-        yield from line_up(make, y, MOTORWAY_SIGHT, 16, generator, gaps=0.05)
+        make = openwork.guard_rail if generator.random() < 0.7 else openwork.wire_fence
+        yield from placing.line_up(make, y, MOTORWAY_SIGHT, 16, generator, gaps=0.05)
 
 
 def _driving(lanes: int, own: int, median: float, generator: Generator) -> Iterator[Surface]:
@@ -64,10 +64,10 @@ def _driving(lanes: int, own: int, median: float, generator: Generator) -> Itera
             if lane == own and abs(x) < 12:
                 continue
             slow = lane in (0, 2 * lanes - 1)
-            car = vehicles.glazed_car if abs(x) < 35 else objects.car
-            make: Make = vehicles.lorry if generator.random() < 0.15 + 0.45 * slow else car
+            car = road_users.glazed_car if abs(x) < 35 else objects.car
+            make: Make = road_users.lorry if generator.random() < 0.15 + 0.45 * slow else car
             heading = 0 if own_carriageway else np.pi
-            yield from place(make(generator), x, y + generator.normal(0, 0.2), heading)
+            yield from placing.place(make(generator), x, y + generator.normal(0, 0.2), heading)
 
 
 def _breakdown(right: float, generator: Generator) -> Iterator[Surface]:
@@ -76,9 +76,11 @@ def _breakdown(right: float, generator: Generator) -> Iterator[Surface]:
     def on_the_shoulder(x: float, y: float) -> bool:
         return right - 2.5 < y < right + 2.3 and x < 60
 
-    makes = [people.person] * generator.integers(2, 8) + [frames.bollard] * generator.integers(0, 8)
-    places = free_places(len(makes), (2.3, 60), 1.2, generator, on_the_shoulder)
-    yield from scatter(makes, places, generator)
+    makes = [road_users.person] * generator.integers(2, 8) + [
+        openwork.bollard
+    ] * generator.integers(0, 8)
+    places = placing.free_places(len(makes), (2.3, 60), 1.2, generator, on_the_shoulder)
+    yield from placing.scatter(makes, places, generator)
 
 
 def _beside(edges: tuple[float, float], generator: Generator) -> Iterator[Surface]:
@@ -88,10 +90,12 @@ def _beside(edges: tuple[float, float], generator: Generator) -> Iterator[Surfac
         ahead, out = generator.uniform(-30, 60, count), generator.exponential(1.5, count)
         yield plants.grass(np.column_stack([ahead, y + side * (out - 1)]), generator)
         for x in along(-30, 50, (5, 40), generator):
-            litter = heaps.rubble(generator.uniform(0.3, 1), generator)
-            yield from place(litter, x, y + side * generator.uniform(-1.5, 0.5))
+            litter = ground.rubble(generator.uniform(0.3, 1), generator)
+            yield from placing.place(litter, x, y + side * generator.uniform(-1.5, 0.5))
         for x in along(*MOTORWAY_SIGHT, (4, 25), generator):
-            yield from place(frames.thin_pole(generator), x, y + side * generator.uniform(0.8, 3))
+            yield from placing.place(
+                openwork.thin_pole(generator), x, y + side * generator.uniform(0.8, 3)
+            )
 
 
 def _gantries(edges: tuple[float, float], generator: Generator) -> Iterator[Surface]:
@@ -99,17 +103,17 @@ def _gantries(edges: tuple[float, float], generator: Generator) -> Iterator[Surf
     for x in along(12, 110, (25, 80), generator):
         height = generator.uniform(5.5, 7.5)
         right, left = edges[0] - 0.5, edges[1] + 0.5
-        yield frames.lattice((x, right, height), (x, left, height), 0.9, generator)
+        yield openwork.lattice((x, right, height), (x, left, height), 0.9, generator)
         for y in (right, left):
-            yield frames.lattice((x, y, 0), (x, y, height + 0.4), 0.5, generator)
+            yield openwork.lattice((x, y, 0), (x, y, height + 0.4), 0.5, generator)
         for y in generator.uniform(right + 2, left - 2, generator.integers(1, 4)):
             plate = shapes.box(0.1, generator.uniform(1.5, 3.5), 0, 2, at=(x - 0.6, y))
-            yield frames.made([shapes.raised(plate, height - 1)], generator)
+            yield openwork.made([shapes.raised(plate, height - 1)], generator)
     if generator.random() < 0.5:
         x, height = generator.uniform(5, 60), generator.uniform(9, 16)
         for lift in range(generator.integers(1, 5)):
             start, end = (np.array([x + 2 * lift, y, height + 0.6 * lift]) for y in (-60.0, 60.0))
-            yield threads.cable(start, end, generator.uniform(1, 3), (0.02, 0.06), generator)
+            yield openwork.cable(start, end, generator.uniform(1, 3), (0.02, 0.06), generator)
 
 
 def _embankments(edges: tuple[float, float], generator: Generator) -> Iterator[Surface]:
@@ -118,26 +122,26 @@ def _embankments(edges: tuple[float, float], generator: Generator) -> Iterator[S
         make, out, piece, gaps = EMBANKMENTS[generator.integers(len(EMBANKMENTS))]
         away = y + side * generator.uniform(0.5, 4)
         line = away + out * side
-        yield from line_up(make, line, MOTORWAY_SIGHT, piece, generator, gaps)
+        yield from placing.line_up(make, line, MOTORWAY_SIGHT, piece, generator, gaps)
         for x in along(*MOTORWAY_SIGHT, (5, 18), generator):
             y = away + side * generator.uniform(1, 12)
-            yield from place(plants.tree(generator.random() < 0.4, generator), x, y)
+            yield from placing.place(plants.tree(generator.random() < 0.4, generator), x, y)
         for x in along(*MOTORWAY_SIGHT, (2, 12), generator):
             scrub = plants.brushwood(generator.uniform(0.5, 2.5), generator)
-            yield from place(scrub, x, away + side * generator.uniform(0.5, 6))
+            yield from placing.place(scrub, x, away + side * generator.uniform(0.5, 6))
 
 
 def _noise_wall(length: float, generator: Generator) -> Iterator[Surface]:
     height = generator.uniform(2, 5)
     yield walls.rough_wall(length, height, generator)
     post = (0, -0.1, 0), (0, -0.1, height + 0.1)
-    yield frames.made([shapes.bars([post], 0.12)], generator)
+    yield openwork.made([shapes.bars([post], 0.12)], generator)
 
 
 # What makes a piece of an embankment, how much farther out it stands and how long a piece is,
 # metres, and the share of gaps.
 EMBANKMENTS: tuple[tuple[Piece, float, float, float], ...] = (
     (_noise_wall, 0, 13, 0.05),
-    (threads.chain_link, 0, 13, 0.1),
-    (heaps.bank, 2, 10, 0.0),
+    (openwork.chain_link, 0, 13, 0.1),
+    (ground.bank, 2, 10, 0.0),
 )

@@ -7,11 +7,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.random import Generator
 
-from derain.simulation import shapes
+from derain.simulation import objects, shapes
 from derain.simulation.arrays import Floats
 from derain.simulation.drawing import Span, log_uniform
-from derain.simulation.objects import Make, Options, Piece, Surface
-from derain.simulation.places.relief import Relief
+from derain.simulation.objects import Make, Options, Piece, Surface, of_size
+from derain.simulation.places import ground, openwork, plants, road_users
+from derain.simulation.places.ground import Relief
 from derain.simulation.track import Track
 
 # Whether something may stand at an x and a y.
@@ -168,3 +169,72 @@ def _cleared(track: Track) -> Track:
     x, y = shapes.nearest_to_axis(track.triangles[about])
     far[about] = np.hypot(x, y) > CLEARANCE
     return Track(track.triangles[far], track.reflectivity[far], track.label[far])
+
+
+# How far from the sensor they are, metres.
+NEAREST, FARTHEST = 2.2, 70.0
+
+
+def users(
+    generator: Generator, allowed: Allowed = anywhere, *, walkers: Counts, cars: Counts
+) -> Iterator[Surface]:
+    """People, up to four cyclists, and vehicles.
+
+    Args:
+        generator: Random generator.
+        allowed: Where they may be.
+        walkers: Fewest people on foot, and one more than the most.
+        cars: The same of vehicles, of which few are lorries.
+    """
+    kinds: Options = [(road_users.glazed_car, 8), (objects.car, 2), (road_users.lorry, 1)]
+    wheeled = choose(kinds, cars, generator)
+    on_foot = choose([(road_users.person, 9), (objects.pedestrian, 1)], walkers, generator)
+    bikes = choose([(road_users.cyclist, 9), (objects.bike, 1)], (1, 5), generator)
+    parked = free_places(len(wheeled), (4.5, FARTHEST), 8.0, generator, allowed)
+
+    def beside_them(x: float, y: float) -> bool:
+        return allowed(x, y) and all(np.hypot(x - a, y - b) > 3.2 for a, b in parked)
+
+    count = len(on_foot) + len(bikes)
+    others = free_places(count, (NEAREST, FARTHEST), 1.0, generator, beside_them)
+    yield from scatter(wheeled, parked, generator)
+    yield from scatter(shuffled([*on_foot, *bikes], generator), others, generator)
+
+
+def ragged_things(
+    generator: Generator, allowed: Allowed = anywhere, *, count: Counts, leafy: bool = True
+) -> Iterator[Surface]:
+    """Bushes, brushwood, nets, pieces of fence, poles, grass, rubble, near the sensor and far.
+
+    Args:
+        generator: Random generator.
+        allowed: Where they may be.
+        count: Fewest, and one more than the most.
+        leafy: Whether plants have leaves.
+    """
+    brushwood = of_size(plants.brushwood, (0.4, 2.5))
+    things: Options = [
+        (_bush if leafy else brushwood, 4),
+        (brushwood, 4),
+        (of_size(openwork.net, (1.5, 8), (1, 3.5)), 1.5),
+        (of_size(openwork.chain_link, (2, 10)), 1),
+        (of_size(openwork.railing, (1, 5)), 1),
+        (openwork.thin_pole, 4),
+        (_tufts, 3),
+        (of_size(ground.rubble, (0.4, 2)), 1),
+        (plants.crowned_tree if leafy else plants.bare_tree, 1.5),
+        (plants.bare_tree, 1),
+    ]
+    makes = choose(things, count, generator)
+    places = free_places(len(makes), (2.5, 60.0), 0.6, generator, allowed)
+    yield from scatter(makes, places, generator)
+
+
+def _bush(generator: Generator) -> Surface:
+    length, width, height = generator.uniform(0.2, 1.5, 3)
+    return plants.bush((length, width, height), generator)
+
+
+def _tufts(generator: Generator) -> Surface:
+    spread = generator.uniform(0.3, 2.5)
+    return plants.grass(generator.normal(0, spread, (generator.integers(5, 60), 2)), generator)

@@ -1,52 +1,18 @@
-"""Walls as they are: rough, with windows, frames, sills, balconies, drain pipes and ivy."""
+"""Walls: of houses, with windows and what hangs on them, and those that close a room."""
 
 from collections.abc import Iterator
-from dataclasses import replace
-from itertools import product
+from dataclasses import dataclass, replace
+from itertools import pairwise, product
 
 import numpy as np
 from numpy.random import Generator
 
 from derain.simulation import shapes
-from derain.simulation.arrays import Floats
-from derain.simulation.drawing import log_uniform
+from derain.simulation.drawing import Span, log_uniform
 from derain.simulation.objects import Surface, of_material, spotted
-from derain.simulation.places.frames import railing
-from derain.simulation.places.threads import cable
-from derain.simulation.shapes import Triangles, bars
-
-GLASS_CELL = 0.04
-MOST_CELLS = 900
-
-# Share of a pane that returns a ray: of clean glass, and of a dirty or frosted pane.
-RETURNING = (0.005, 0.6)
-
-
-def pane(corners: Floats, generator: Generator) -> Triangles:
-    """A pane of glass.
-
-    Args:
-        corners: Its four corners in order, (4, 3), metres.
-        generator: Random generator.
-    """
-    sides = np.linalg.norm(corners[[1, 3]] - corners[0], axis=1)
-    cell = max(GLASS_CELL, float(np.sqrt(sides.prod() / MOST_CELLS)))
-    wide, high = (1 + int(side / cell) for side in sides)
-    share = log_uniform(RETURNING, generator)
-    # A pane is never nothing at all.
-    there = generator.permutation(wide * high)[: 1 + generator.binomial(wide * high - 1, share)]
-    column, row = there % wide, there // wide
-    u, v = ((edge / count)[:, None] for edge, count in ((column, wide), (row, high)))
-    ends = (0, 0), (1, 0), (1, 1), (0, 1)
-    return shapes.quads(*(_between(corners, u + i / wide, v + j / high) for i, j in ends))
-
-
-def _between(corners: Floats, u: Floats, v: Floats) -> Floats:
-    """Places by their shares of the way from the first corner to the second and to the fourth."""
-    first, second, third, fourth = corners
-    lower, upper = (1 - u) * first + u * second, (1 - u) * fourth + u * third
-    return np.asarray((1 - v) * lower + v * upper)
-
+from derain.simulation.places.openwork import cable, made, pane, railing
+from derain.simulation.places.placing import place
+from derain.simulation.shapes import Point, bars
 
 STONE = (0.08, 0.7)
 GLASS = (0.01, 0.2)
@@ -111,10 +77,10 @@ def facade(length: float, generator: Generator) -> Iterator[Surface]:
         frames += [((x, recess, z), (x, recess, top)), ((left, -0.05, z), (right, -0.05, z))]
     yield of_material(panes, GLASS, generator)
     yield of_material([bars(frames, 0.03)], STONE, generator)
-    yield from _on_the_wall(length, height, storey, generator)
+    yield from _on_the_front(length, height, storey, generator)
 
 
-def _on_the_wall(
+def _on_the_front(
     length: float, height: float, storey: float, generator: Generator
 ) -> Iterator[Surface]:
     """What hangs on a house: drain pipes, balconies, wires, ivy, an aerial."""
@@ -136,3 +102,136 @@ def _on_the_wall(
     aerial = [((middle, 1, height), (middle, 1, height + 2))]
     aerial += [((middle - 0.4, 1, z), (middle + 0.4, 1, z)) for z in rods]
     yield of_material([bars(aerial, 0.012)], STONE, generator)
+
+
+FLOOR = (0.03, 0.6)
+
+# Of the bumps of a wall, what floors and ceilings have.
+SMOOTH = 0.2
+
+# Walls, floors and ceilings overlap by so much, metres: bumps leave no slit between them.
+OVERLAP = 0.1
+
+# How far behind a window or a door the next wall is, metres.
+BEYOND = (1.0, 40.0)
+
+
+@dataclass(frozen=True)
+class Walls:
+    """Where the walls are, with the sensor at the origin.
+
+    Attributes:
+        x: From wall to wall along x, metres.
+        y: From wall to wall along y, metres.
+        height: Of the ceiling, metres.
+        margin: Least distance of the middle of a thing from the walls, metres.
+    """
+
+    x: Span
+    y: Span
+    height: float
+    margin: float = 0.35
+
+    @classmethod
+    def draw(cls, shortest: Span, longest: Span, generator: Generator) -> "Walls":
+        """Draws walls by the spans of the length of the shorter side and of the longer one."""
+        sides = [log_uniform(span, generator) for span in (shortest, longest)]
+        along, across = (sides[which] for which in generator.permutation(2))
+        behind, right = (
+            np.clip(generator.uniform(0, side), 0.7, side - 0.7) for side in (along, across)
+        )
+        return cls(
+            (-float(behind), float(along - behind)),
+            (-float(right), float(across - right)),
+            generator.uniform(2.3, 4.5),
+        )
+
+    @property
+    def corners(self) -> list[tuple[float, float]]:
+        """Seen from above, around."""
+        (behind, ahead), (right, left) = self.x, self.y
+        return [(behind, right), (ahead, right), (ahead, left), (behind, left)]
+
+    def holds(self, x: float, y: float) -> bool:
+        """Whether there is room for a thing between the walls."""
+        inside = self.x[0] + self.margin < x < self.x[1] - self.margin
+        return inside and self.y[0] + self.margin < y < self.y[1] - self.margin
+
+
+def shell(room: Walls, generator: Generator) -> Iterator[Surface]:
+    """Floor, ceiling and walls, closed but for windows and doorways."""
+    length, width = room.x[1] - room.x[0], room.y[1] - room.y[0]
+    for height, bumps in ((0.0, SMOOTH), (room.height, -SMOOTH)):
+        rough = rough_wall(length + 2 * OVERLAP, width + 2 * OVERLAP, generator, cell=0.5)
+        rough = rough.moved(-OVERLAP, 0, -OVERLAP)
+        lying = laid_flat(rough, (room.x[0], room.y[0]), height, bumps)
+        yield replace(lying, reflectivity=log_uniform(FLOOR, generator))
+    for number, (start, end) in enumerate(pairwise([*room.corners, room.corners[0]])):
+        length = float(np.hypot(end[0] - start[0], end[1] - start[1]))
+        kind = generator.choice(["whole", "glass", "doorway"], p=[0.5, 0.3, 0.2])
+        if length < 1.5 or kind == "whole":
+            whole = rough_wall(length + 2 * OVERLAP, room.height, generator, cell=0.5)
+            wall = [whole.moved(-OVERLAP, 0, 0)]
+        else:
+            sill, lintel = (generator.choice([0.0, 0.9]), 2.1) if kind == "glass" else (0.0, 2.0)
+            wide = length - 0.4 if kind == "glass" else 0.9
+            wall = [*_pierced(length, room.height, (wide, sill, lintel), generator)]
+            if kind == "glass":
+                wall += [*_panes(length, (wide, sill, lintel), generator)]
+            behind = rough_wall(length + 8, room.height + 2, generator, cell=0.8)
+            wall.append(behind.moved(-4, -log_uniform(BEYOND, generator), -1))
+        wall += [*_on_the_wall(length, room.height, generator)]
+        yield from place(wall, *start, number * np.pi / 2)
+
+
+def _pierced(
+    length: float, height: float, opening: tuple[float, float, float], generator: Generator
+) -> Iterator[Surface]:
+    """A wall with an opening in the middle, by its width, lower and upper edge, and its frame."""
+    wide, low, high = opening
+    left, right = (length - wide) / 2, (length + wide) / 2
+    pieces = [((0.0, left), (0.0, height)), ((right, length), (0.0, height))]
+    pieces += [((left, right), (high, height)), ((left, right), (0.0, low))]
+    shine = log_uniform(STONE, generator)
+    for (begin, end), (bottom, top) in pieces:
+        if top - bottom > 0.01:
+            piece = rough_wall(end - begin, top - bottom, generator, cell=0.5)
+            yield replace(piece.moved(begin, 0, bottom), reflectivity=shine)
+    edges: list[tuple[Point, Point]] = [((x, 0, low), (x, 0, high)) for x in (left, right)]
+    edges += [((left, 0, z), (right, 0, z)) for z in (low, high)]
+    yield made([bars(edges, generator.uniform(0.02, 0.08))], generator)
+
+
+def _panes(
+    length: float, opening: tuple[float, float, float], generator: Generator
+) -> Iterator[Surface]:
+    """Glass in an opening, frames between the panes, blinds or a curtain before some of them."""
+    wide, low, high = opening
+    x = np.linspace((length - wide) / 2, (length + wide) / 2, 2 + int(wide / 1.4))
+    for left, right in pairwise(x):
+        corners = np.array([(left, 0, low), (right, 0, low), (right, 0, high), (left, 0, high)])
+        yield made([pane(corners, generator)], generator)
+        yield made([bars([((left, 0, low), (left, 0, high))], 0.03)], generator)
+        if generator.random() < 0.2:
+            slats = np.arange(low + generator.uniform(0, high - low - 0.2), high, 0.06)
+            ends = [((left, 0.06, z), (right, 0.06, z)) for z in slats]
+            yield made([bars(ends, 0.01)], generator)
+
+
+def _on_the_wall(length: float, height: float, generator: Generator) -> Iterator[Surface]:
+    """Pictures, boards, pipes, a radiator, coats on hooks, cables; the room lies at positive y."""
+    for _ in range(generator.integers(0, 4)):
+        x, z = generator.uniform(0, length), generator.uniform(0.8, 2.0)
+        side, deep = generator.uniform(0.1, 0.9), generator.uniform(0.01, 0.15)
+        yield made([shapes.box(side, deep, z, z + 0.6 * side, at=(x, 0.05))], generator)
+    if generator.random() < 0.5:
+        x = generator.uniform(0, length)
+        radius = log_uniform((0.008, 0.06), generator)
+        yield made([bars([((x, 0.12, 0), (x, 0.12, height))], radius, 6)], generator)
+    if generator.random() < 0.4 and length > 1.5:
+        ribs = generator.uniform(0, length - 1) + np.arange(0, 1, 0.07)
+        yield made([bars([((a, 0.1, 0.15), (a, 0.1, 0.75)) for a in ribs], 0.02)], generator)
+    for _ in range(generator.integers(0, 3)):
+        along, up = generator.uniform(0, length, 2), generator.uniform(0.1, 2.2, 2)
+        start, end = np.column_stack([along, (0.05, 0.05), up])
+        yield cable(start, end, generator.uniform(0, 0.3), (0.004, 0.02), generator)

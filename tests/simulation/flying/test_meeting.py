@@ -10,15 +10,18 @@ from hypothesis import strategies as st
 
 from derain.simulation.arrays import Floats
 from derain.simulation.classes import TrackClass
-from derain.simulation.flying.encounters import Encounters, covered_share
-from derain.simulation.flying.meeting import draw_haze, meet, uncrowded
+from derain.simulation.flying.meeting import Encounters, covered_share, draw_haze, meet, uncrowded
 from derain.simulation.flying.optics import Optics, Sizes, Slices
 from derain.simulation.flying.precipitation import KINDS, Precipitation
 from derain.simulation.rain import rain_on_beams
 from derain.simulation.rain_field import UniformRain
 from derain.simulation.sensor import Returns, Sensor
 
-from ..surfaces import random_surfaces, surfaces
+from ..surfaces import (
+    assert_kept_weaker_or_ends_at_a_particle_or_lost,
+    random_surfaces,
+    surfaces,
+)
 
 SENSOR = Sensor(columns=60, rows=30)
 BEAMS = SENSOR.beams()
@@ -110,23 +113,8 @@ def test_whatever_flies_each_beam_is_kept_weaker_or_ends_nearer_or_is_lost(
     sensor, clear = replace(SENSOR, returns=returns), random_surfaces(len(BEAMS), generator)
     weather = KINDS[kind].draw(kind, generator)
     detected = meet(clear, BEAMS, weather, sensor, np.random.default_rng(seed))
-    beam, returned = detected.beam, detected.returned
-    rain = detected.label == TrackClass.RAIN
-    kept = returned & ~rain
-
-    assert set(beam) == set(range(len(BEAMS)))
-    assert (np.diff(beam) >= 0).all()
-    assert np.bincount(beam).max() <= (2 if returns == "dual" else 1)
-    assert (detected.power[returned] >= sensor.detection_threshold * (1 - 1e-9)).all()
-    assert (detected.reflectivity <= 1).all()
-    assert returned[rain].all()
-    assert (detected.range[rain] <= np.minimum(clear.range[beam[rain]], 120)).all()
-    assert (detected.range[rain] >= sensor.minimum_range).all()
-    assert (detected.range[kept] == clear.range[beam[kept]]).all()
-    assert (detected.label[kept] == clear.label[beam[kept]]).all()
-    assert (detected.reflectivity[kept] <= clear.reflectivity[beam[kept]]).all()
-    assert (detected.range[~returned] == sensor.maximum_range).all()
-    assert not rain.any() or kind != "none"
+    assert_kept_weaker_or_ends_at_a_particle_or_lost(clear, detected, sensor)
+    assert kind != "none" or not (detected.label == TrackClass.RAIN).any()
     again = meet(clear, BEAMS, weather, sensor, np.random.default_rng(seed))
     assert_same(detected, again)
 

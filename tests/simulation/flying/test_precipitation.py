@@ -79,11 +79,9 @@ def test_a_wrong_document_is_refused_with_its_place(value: object, named: str) -
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("number", -1.0),
         ("number", math.nan),
         ("number", math.inf),
         ("diameter", 0.0),
-        ("largest", 0.1),
         ("largest", 100.0),
         ("reflectivity", 1.1),
         ("flicker", 1.0),
@@ -91,14 +89,12 @@ def test_a_wrong_document_is_refused_with_its_place(value: object, named: str) -
         ("cut_off", 0.0),
         ("crowding", math.nan),
         ("gust_form", "storm"),
-        ("haze", 1.5),
         ("haze_strength", 0.5),
-        ("plumes", -1),
     ],
 )
 def test_precipitation_that_cannot_be_is_refused_by_name(name: str, value: object) -> None:
     with pytest.raises(InputError, match=name):
         replace(Precipitation(), **{name: value})
-    if not isinstance(value, str | int):  # a kind is drawn from what can be
+    if not isinstance(value, str):  # a kind is drawn from what can be
         with pytest.raises(InputError, match=name):
             Kind(**{name: (value, value)})
