@@ -8,8 +8,8 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from derain.evaluation.counts import ClassCounts
 from derain.evaluation.operating_points import OperatingPoints
-from derain.evaluation.rain_counts import ClassCounts
 from derain.evaluation.text_tables import number_text
 from derain.pictures.palette import LOST, MISSED
 from derain.pictures.scan_pictures import legend_below
