@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from derain.cards.card import DataCard
 from derain.errors import reason_of
-from derain.evaluation.counts import Counts
-from derain.evaluation.rain_counts import ClassCounts, RainCounts
+from derain.evaluation.counts import ClassCounts, Counts, RainCounts
 from derain.scan import Scan
 from derain.views.morton import first_rows
 

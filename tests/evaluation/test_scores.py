@@ -3,10 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from derain.cards.card import DataCard
-from derain.errors import InputError
 from derain.evaluation.baselines import all_points, no_points
 from derain.evaluation.counts import Counts
 from derain.evaluation.scores import score
@@ -67,12 +65,3 @@ def test_copies_of_a_point_count_once_where_that_is_asked(
     doubled = [scan.take(np.repeat(np.arange(len(scan)), 2)) for scan in scans]
     assert score([all_points], doubled, card)[0].pooled == Counts(180, 1580, 0, 0)
     assert score([all_points], doubled, card, distinct=True) == score([all_points], scans, card)
-
-
-def test_scans_without_labels_and_labels_without_a_class_are_refused(
-    scans: list[Scan], card: DataCard
-) -> None:
-    with pytest.raises(InputError, match="scan 0: it has no labels"):
-        score([all_points], [replace(scans[0], label=None)], card)
-    with pytest.raises(InputError, match="id 7 is no known class"):
-        score([all_points], [replace(scans[0], label=np.full(300, 7))], card)

@@ -5,8 +5,8 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from derain.evaluation.counts import ClassCounts
 from derain.evaluation.operating_points import ThresholdCounts
-from derain.evaluation.rain_counts import ClassCounts
 from derain.pictures.error_pictures import MOST_CLASSES, errors_figure, operating_points_figure
 
 BANDS = ["0-10 m", "10+ m"]
