@@ -16,12 +16,12 @@ import derain
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
-from derain.export.machine import versions
 from derain.export.methods import load_method
 from derain.export.model_file import ModelFile
 from derain.export.runtime import Derainer
 from derain.export.runtimes.onnx_runtime import WRONG_FUSION
 from derain.export.runtimes.session import RUNTIMES, Runtime, Session, TensorType
+from derain.export.timing import versions
 from derain.models.checkpoint import load_model
 from derain.scan import Scan
 
