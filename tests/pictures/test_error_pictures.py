@@ -7,7 +7,7 @@ from matplotlib.lines import Line2D
 
 from derain.evaluation.counts import ClassCounts
 from derain.evaluation.operating_points import ThresholdCounts
-from derain.pictures.error_pictures import MOST_CLASSES, errors_figure, operating_points_figure
+from derain.pictures.error_pictures import errors_figure, operating_points_figure
 
 BANDS = ["0-10 m", "10+ m"]
 
@@ -39,14 +39,6 @@ def test_the_table_has_shares_and_points_with_rain_first() -> None:
         *("10.00%\n5 of 50", "0.00%\n0 of 50", "5.00%\n5 of 100"),
         *("1.00%\n1 of 100", "-", "1.00%\n1 of 100"),
     ]
-
-
-def test_what_errs_least_of_many_classes_stands_in_one_row() -> None:
-    counts = {f"{n}": [ClassCounts(100, n, rain=False)] * 2 for n in range(1, MOST_CLASSES + 6)}
-    names, cells = table_of(errors_figure(counts, BANDS, "title"))
-    assert len(names) == MOST_CLASSES
-    assert names[-1] == "6 others"
-    assert cells[-1] == f"{sum(range(1, 7)) / 600:.2%}\n{2 * sum(range(1, 7))} of 1,200"
 
 
 def test_the_curve_is_marked_where_the_threshold_is() -> None:
