@@ -17,11 +17,10 @@ from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export import onnx_file
 from derain.export.onnx_file import export
-from derain.export.proof import FINITE, FLOAT32, INT8, THREADS, Case, Proof, prove
+from derain.export.proof import FINITE, FLOAT32, INT8, Case, Proof, prove
 from derain.export.runtime import Derainer
 from derain.models.outdet import OutDet
 from derain.scan import Scan
-from derain.sources.source import Frames
 
 SCENE = [("scene", Scan.of(scene()))]
 
@@ -55,21 +54,6 @@ def test_the_file_holds_a_whole_network_and_how_it_is_used(
     properties = {entry.key: entry.value for entry in proto.metadata_props}
     assert properties["license"] == "network: MIT; training data: CC BY-NC-SA 4.0"
     assert properties["version"] == derain.__version__
-
-
-def test_the_proof_in_the_file_is_that_of_every_hard_case(
-    onnx_model: Path, random_outdet: OutDet
-) -> None:
-    written = Derainer(onnx_model).metadata["proof"]
-    view = random_outdet.spec.make_view()
-    judged = {name: len(view(scan).points) for name, scan in hard_cases()}
-    assert [(case["name"], case["threads"], case["points"]) for case in written["cases"]] == [
-        (name, threads, points) for name, points in judged.items() for threads in THREADS
-    ]
-    assert written["points"] == len(THREADS) * sum(judged.values())
-    assert written["largest_difference"] == max(case["difference"] for case in written["cases"])
-    assert written["flipped"] == sum(case["flipped"] for case in written["cases"])
-    assert 0 < written["largest_difference"] < 1e-5
 
 
 @pytest.mark.parametrize("offset", [1e-3, 0.5])
@@ -190,14 +174,9 @@ def test_an_older_file_stays_as_it_was_when_the_exported_network_is_wrong(
     assert [file.read_bytes() for file in tmp_path.iterdir()] == [b"an older model"]
 
 
-def test_what_cannot_be_exported_leaves_nothing(
-    tmp_path: Path, random_outdet: OutDet, onnx_model: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_cannot_be_exported_leaves_nothing(tmp_path: Path, random_outdet: OutDet) -> None:
     with pytest.raises(InputError, match="outdet: has not been trained"):
         export(OutDet(), tmp_path / "model.onnx")
-    monkeypatch.setattr(onnx_file, "_traced", lambda *_: onnx.load(onnx_model))
-    with pytest.raises(InputError, match="no convolution to quantise"):
-        export(random_outdet, tmp_path / "model.onnx", Frames.of_scans([scene(99)]))
     with pytest.raises(InputError, match="is not a file that can be replaced"):
         export(random_outdet, tmp_path)
     assert list(tmp_path.iterdir()) == []

@@ -8,10 +8,8 @@ import pytest
 import yaml
 
 from derain.errors import InputError
-from derain.export.methods import load_method, named_method, read_parameters, require_one_scan
-from derain.files.reading import is_file
+from derain.export.methods import load_method, named_method, read_parameters
 from derain.filters.derainer import CANDIDATES
-from derain.recordings.persistence import PersistenceDerainer
 from derain.views.candidates import Bound, Candidates
 
 KEPT = Path(__file__).parent / "kept"
@@ -56,26 +54,12 @@ def test_a_method_that_cannot_be_made_is_refused(
     assert reason in str(refusal.value)
 
 
-def test_a_method_of_several_scans_is_not_measured_on_single_ones() -> None:
-    with pytest.raises(InputError, match="persistence: sees the scans around the one"):
-        require_one_scan(PersistenceDerainer())
-
-
-def test_a_name_too_long_for_a_file_is_one_line() -> None:
-    with pytest.raises(InputError, match=r"cannot be read .*too long"):
-        is_file(Path("x" * 5000))
-
-
 @pytest.mark.parametrize(
     "content",
     [
         "",
-        "- dsor",
         "neighbours: 3",
         "method: 5",
-        "method: dsor\n2: 3",
-        "a: b: c",
-        'method: "dsor\\0"',
         "method: dsor\nneighbours: [5]",
         "method: dsor\nrange_multiplier: .inf",
         "method: dsor\nrange_multiplier: null",

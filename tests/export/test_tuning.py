@@ -1,6 +1,5 @@
 """Tuning finds what is there to be found, and goes on where it stopped."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -146,16 +145,6 @@ def test_a_stored_study_goes_on_with_the_same_scans_and_labels_alone(
             tune("dsor", scans, 9, storage, data)
     # Another filter has a study of its own in the same file.
     assert tune("ror", seen, 1, storage, data="b")[0].iou > 0
-
-
-@pytest.mark.parametrize("make", [Path.mkdir, lambda path: path.write_text("no database" * 99)])
-def test_a_storage_that_cannot_be_used_is_refused(
-    make: Callable[[Path], object], seen: list[LabelledNeighbourhoods], tmp_path: Path
-) -> None:
-    storage = tmp_path / "study.db"
-    make(storage)
-    with pytest.raises(InputError, match="cannot be used as storage"):
-        tune("dsor", seen, 1, storage)
 
 
 # Two of them are neighbours: nothing lies midway.
