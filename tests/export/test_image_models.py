@@ -23,12 +23,9 @@ from derain.export.onnx_file import export, with_metadata
 from derain.export.proof import FINITE, INT8, THREADS, Proof
 from derain.export.quantisation import CalibrationReader
 from derain.export.runtime import Derainer
-from derain.files import read_scan
 from derain.models.base import DerainingModule
 from derain.scan import Scan
-from derain.sources import file_frame
-from derain.sources.folders import named_frames
-from derain.sources.frame import Frame
+from derain.sources.frame import Frame, MemoryFrame
 from derain.sources.source import Frames
 from derain.views.probability import probability_of_rain
 from derain.views.range_image import RangeView
@@ -166,16 +163,12 @@ def test_one_calibration_scan_is_held_at_a_time(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    paths = [tmp_path / "scans" / f"{number}.bin" for number in range(4)]
-    paths[0].parent.mkdir()
-    for number, path in enumerate(paths):
-        scene(500, number).tofile(path)
     held: weakref.WeakSet[Scan] = weakref.WeakSet()
-    read: list[tuple[Path, int]] = []
+    read: list[tuple[str, int]] = []
 
-    def counted(path: Path, columns: Sequence[str]) -> Scan:
-        read.append((path, len(held)))
-        scan = read_scan(path, columns)
+    def counted(frame: MemoryFrame) -> Scan:
+        read.append((frame.name, len(held)))
+        scan = Scan.of(scene(500), frame.name)
         held.add(scan)
         return scan
 
@@ -187,10 +180,10 @@ def test_one_calibration_scan_is_held_at_a_time(
             pass
         return proto
 
-    monkeypatch.setattr(file_frame, "read_scan", counted)
+    monkeypatch.setattr(MemoryFrame, "read", counted)
     monkeypatch.setattr(onnx_file, "_traced", lambda *_: onnx.load(image_onnx))
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [])
     monkeypatch.setattr(onnx_file, "quantised", gone_through)
-    assert export(image_model, tmp_path / "model.onnx", named_frames(paths)).holds
+    assert export(image_model, tmp_path / "model.onnx", CALIBRATION).holds
     # Once to be scaled by, and once to be proved on; none while another is held.
-    assert read == [(path, 0) for path in (*paths, *paths)]
+    assert read == [(frame.name, 0) for frame in (*CALIBRATION, *CALIBRATION)]

@@ -114,17 +114,3 @@ def test_a_number_that_another_search_was_faster_to_take_is_not_computed_twice()
     trials = complete(storage)
     assert len(trials) == 9
     assert len({trial.params["x"] for trial in trials}) == 9
-
-
-def test_of_two_that_compute_a_trial_the_first_counts() -> None:
-    storage = InMemoryStorage()
-    one, other = join(storage), join(storage)
-    trial = one.next(1)
-    again = other.next(1)  # there is nothing else to do, and nobody knows of the first
-    assert trial is not None
-    assert again is not None
-    assert again.number == trial.number == 0
-    one.finish(trial, 1.0)
-    other.finish(again, 1.0)
-    assert (one.next(1), other.next(1)) == (None, None)
-    assert one.best() == other.best() == (FIRST, 1.0)
