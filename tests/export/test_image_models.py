@@ -6,20 +6,17 @@ they are one, the one with most operators in eight bits.
 
 import weakref
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import onnx
 import pytest
-import torch
 
 from derain import models
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export import onnx_file
-from derain.export.onnx_file import export, with_metadata
+from derain.export.onnx_file import export
 from derain.export.proof import FINITE, INT8, THREADS, Proof
 from derain.export.quantisation import CalibrationReader
 from derain.export.runtime import Derainer
@@ -27,8 +24,6 @@ from derain.models.base import DerainingModule
 from derain.scan import Scan
 from derain.sources.frame import Frame, MemoryFrame
 from derain.sources.source import Frames
-from derain.views.probability import probability_of_rain
-from derain.views.range_image import RangeView
 from derain.views.view import View
 
 PIXELS = 18 * 60
@@ -69,33 +64,6 @@ def test_the_graph_is_of_one_size_and_holds_nothing_of_the_machine(
         "valid": [1, 1, 18, 60],
         "logits": [PIXELS, 2],
     }
-
-
-def test_the_back_projection_of_the_spec_decides_for_what_lost_its_pixel_alone(
-    image_model: DerainingModule, image_onnx: Path, tmp_path: Path
-) -> None:
-    derainer, scan = Derainer(image_onnx, threads=1), Scan.of(scene())
-    assert derainer.spec == image_model.spec
-    assert 0.2 < derainer(scan).mean() < 0.8  # what is compared is worth comparing
-    view = derainer.view(scan)
-    with torch.inference_mode():
-        inputs = {name: torch.from_numpy(array) for name, array in view.inputs().items()}
-        score = probability_of_rain(image_model(**inputs).numpy())
-    answers: dict[str, Any] = {}
-    for back_projection in ("nearest range", "copy", "vote"):
-        spec = replace(derainer.spec, view={**derainer.spec.view, "way_back": back_projection})
-        path = tmp_path / "changed.onnx"
-        path.write_bytes(with_metadata(onnx.load(image_onnx), {"spec": spec.as_dict()}))
-        changed = Derainer(path, threads=1)
-        assert isinstance(changed.view, RangeView)
-        answers[back_projection] = changed.probability(scan)
-        expected = changed.view(scan).back(score)
-        np.testing.assert_allclose(answers[back_projection], expected, rtol=0, atol=1e-3)
-    shown = (view.pixel >= 0) & ~view.hidden
-    np.testing.assert_array_equal(answers["copy"][shown], answers["nearest range"][shown])
-    np.testing.assert_array_equal(derainer.probability(scan), answers["nearest range"])
-    for one, other in (("copy", "nearest range"), ("nearest range", "vote"), ("vote", "copy")):
-        assert (answers[one][view.hidden] != answers[other][view.hidden]).any()
 
 
 def test_convolutions_compute_in_eight_bits_and_the_file_is_smaller(
