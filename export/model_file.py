@@ -1,6 +1,6 @@
 """The metadata of an ONNX file, read from its bytes without the onnx package.
 
-The file is not trusted: all that derain asks of it is looked at before a network is made of it.
+The file is not trusted: all that derain reads of it is checked before a network is made of it.
 """
 
 from collections.abc import Iterator

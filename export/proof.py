@@ -108,7 +108,7 @@ class Proof:
 
     Attributes:
         cases: The scans, on each number of threads.
-        by_other: How it compares by a runtime other than onnxruntime, where it was asked for.
+        by_other: How it compares by a runtime other than onnxruntime, where one is named.
     """
 
     cases: tuple[Case, ...]

@@ -51,7 +51,7 @@ def score(
 
     Args:
         methods: The methods.
-        scans: Labelled scans. One is in memory at a time, if they are read as they are asked for.
+        scans: Labelled scans. One is in memory at a time, if each is read when its turn comes.
         card: Their data card.
         distinct: Count points at one position once.
         rain_rates: Rain rate of each scan in mm/h, None where it is not known; None for all scans.

@@ -118,9 +118,8 @@ def _curves(labels: Labels | None) -> views.Horizontal:
     text = views.TextDocumentView(origin=entities.CAPTION, name="Scan")
     if labels is None:
         return views.Horizontal(shares, text, column_shares=[3, 1])
-    iou = _curve(
-        entities.IOU, f"IoU with the {labels.name}", legend=False
-    )  # colours as in the shares
+    # Its lines have the colours of the shares.
+    iou = _curve(entities.IOU, f"IoU with the {labels.name}", legend=False)
     return views.Horizontal(shares, iou, text, column_shares=[3, 3, 2])
 
 

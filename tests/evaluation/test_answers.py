@@ -24,7 +24,7 @@ from derain.sources.frame import MemoryFrame
 
 
 @pytest.fixture
-def asked(scans: list[Scan]) -> list[tuple[Scan, np.ndarray]]:
+def judged(scans: list[Scan]) -> list[tuple[Scan, np.ndarray]]:
     """Labelled scans, with rows that cannot be judged, and what a student calls rain in them."""
     rng = np.random.default_rng(0)
     for scan in scans:
@@ -34,23 +34,23 @@ def asked(scans: list[Scan]) -> list[tuple[Scan, np.ndarray]]:
 
 
 def test_every_point_that_can_be_judged_is_counted_once(
-    asked: list[tuple[Scan, np.ndarray]], card: DataCard
+    judged: list[tuple[Scan, np.ndarray]], card: DataCard
 ) -> None:
-    answers = total([Answers.of(scan, card, called) for scan, called in asked])
+    answers = total([Answers.of(scan, card, called) for scan, called in judged])
     expected = np.zeros_like(answers.table)
-    for scan, called in asked:
+    for scan, called in judged:
         answer = answer_of(scan, card)
         for row in np.flatnonzero(scan.valid):
             band = max(i for i, edge in enumerate(FINE_EDGES) if scan.range[row] >= edge)
             expected[band, answer[row], int(called[row])] += 1
     np.testing.assert_array_equal(answers.table, expected)
-    assert answers.points == sum(scan.valid.sum() for scan, _ in asked)
+    assert answers.points == sum(scan.valid.sum() for scan, _ in judged)
 
 
 def test_shares_and_agreement_are_those_of_the_points(
-    asked: list[tuple[Scan, np.ndarray]], card: DataCard
+    judged: list[tuple[Scan, np.ndarray]], card: DataCard
 ) -> None:
-    scan, called = asked[0]
+    scan, called = judged[0]
     answers = Answers.of(scan, card, called)
     valid, answer = scan.valid, answer_of(scan, card)
     for number in (NOT_RAIN, RAIN, NOT_KNOWN):

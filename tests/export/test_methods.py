@@ -24,15 +24,15 @@ BOUNDS = Candidates((Bound("range", most=30.0), Bound("z", least=-1.5)), 0.5)
         (str(KEPT / "outdet.onnx"), {"threshold": 0.25}),
     ],
 )
-def test_what_a_method_says_of_itself_makes_the_same_again(
+def test_a_method_is_made_again_from_what_it_writes(
     tmp_path: Path, name: str, parameters: dict[str, Any]
 ) -> None:
-    told = load_method(name, parameters, 1).as_dict()
-    (tmp_path / "same.yaml").write_text(yaml.safe_dump(json.loads(json.dumps(told))))
+    written = load_method(name, parameters, 1).as_dict()
+    (tmp_path / "same.yaml").write_text(yaml.safe_dump(json.loads(json.dumps(written))))
     same_name, same_parameters = named_method(str(tmp_path / "same.yaml"))
     assert same_name == name
     assert parameters.items() <= same_parameters.items()
-    assert load_method(same_name, same_parameters, 1).as_dict() == told
+    assert load_method(same_name, same_parameters, 1).as_dict() == written
 
 
 @pytest.mark.parametrize(

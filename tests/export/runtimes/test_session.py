@@ -64,7 +64,7 @@ def test_what_no_runtime_has_is_refused_with_what_there_is(
 def test_a_runtime_of_another_package_is_given_threads_and_precision(rainy: type[Session]) -> None:
     derainer = Derainer(KEPT, 2, "rainy", "int2")
     assert isinstance(derainer.session, rainy)
-    assert derainer.session.asked == (2, "int2")
+    assert derainer.session.settings == (2, "int2")
     assert derainer(scene(300)).all()
     loaded = load_method(str(KEPT), {}, 1, Runtime("rainy", "bf16"))
     assert isinstance(loaded, Derainer)
