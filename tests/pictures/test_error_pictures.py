@@ -28,7 +28,7 @@ def chosen_point(figure: Figure) -> Line2D:
 def test_the_table_has_shares_and_points_with_rain_first() -> None:
     counts = {
         "road": [ClassCounts(100, 1, rain=False), ClassCounts(0, 0, rain=False)],
-        "car": [ClassCounts(50, 5, rain=False), ClassCounts(50, 0, rain=False)],
+        "car": [ClassCounts(50, 15, rain=False), ClassCounts(50, 0, rain=False)],
         "nobody": [ClassCounts(0, 0, rain=False)] * 2,
         "drops": [ClassCounts(40, 30, rain=True), ClassCounts(10, 10, rain=True)],
     }
@@ -36,7 +36,7 @@ def test_the_table_has_shares_and_points_with_rain_first() -> None:
     assert names == ["drops (rain)", "car", "road"]
     assert cells == [
         *("25.00%\n10 of 40", "0.00%\n0 of 10", "20.00%\n10 of 50"),
-        *("10.00%\n5 of 50", "0.00%\n0 of 50", "5.00%\n5 of 100"),
+        *("30.00%\n15 of 50", "0.00%\n0 of 50", "15.00%\n15 of 100"),
         *("1.00%\n1 of 100", "-", "1.00%\n1 of 100"),
     ]
 
