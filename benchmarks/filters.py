@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from turns import milliseconds_in_turns
 
 from derain.errors import InputError
-from derain.export.machine import versions
+from derain.export.timing import versions
 from derain.files import read_scan
 from derain.filters import CRF, DROR, DSOR, ROR, SOR, SSR, FilterDerainer, PointFilter
 from derain.scan import Scan

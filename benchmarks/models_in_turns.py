@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 import onnxruntime
 
-from derain.export.machine import versions
 from derain.export.runtime import Derainer
+from derain.export.timing import versions
 from derain.files import read_scan
 from derain.system.stopwatch import Stopwatch
 

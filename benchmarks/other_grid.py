@@ -11,8 +11,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from derain.export.onnx_file import export
-from derain.files import read_scan
 from derain.models.checkpoint import load_model
+from derain.sources.folders import named_frames
 
 
 def main() -> None:
@@ -26,7 +26,7 @@ def main() -> None:
 
     model, other = load_model(arguments.checkpoint), load_model(arguments.grid)
     model.adopt(replace(model.spec, view=other.spec.view))
-    export(model, arguments.out, [read_scan(scan) for scan in arguments.calibration])
+    export(model, arguments.out, named_frames(arguments.calibration))
 
 
 if __name__ == "__main__":

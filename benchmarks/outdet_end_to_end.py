@@ -25,9 +25,9 @@ from derain.datamodules.base import Loading
 from derain.datamodules.labelled import labelled_scans
 from derain.evaluation.counts import Counts
 from derain.export.candidates import fit_network_candidates
-from derain.export.machine import versions
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
+from derain.export.timing import versions
 from derain.models.outdet import OutDet
 from derain.models.published import read_state_dict
 from derain.scan import Scan

@@ -16,9 +16,9 @@ from libraries import installed
 from numpy.typing import NDArray
 from turns import milliseconds_in_turns
 
-from derain.export.machine import versions
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
+from derain.export.timing import versions
 from derain.files import read_scan
 from derain.models.checkpoint import load_model
 from derain.models.outdet import deployed

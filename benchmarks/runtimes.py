@@ -16,10 +16,10 @@ import numpy as np
 from turns import milliseconds_in_turns
 
 from derain.errors import InputError
-from derain.export.machine import versions
 from derain.export.proof import compare_runtimes
 from derain.export.runtime import Derainer
 from derain.export.runtimes.session import DEFAULT_RUNTIME
+from derain.export.timing import versions
 from derain.files import read_scan
 from derain.scan import Scan
 from derain.views.view import ViewedScan

@@ -34,7 +34,7 @@ import torch
 
 from benchmarks.installed import DERAIN
 from derain.evaluation.text_tables import markdown_table
-from derain.export.machine import versions
+from derain.export.timing import versions
 
 NETWORKS = ("outdet", "salsanext", "lisnownet")
 EPOCHS = 2

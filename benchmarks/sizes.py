@@ -18,7 +18,7 @@ import yaml
 from derain.cli.main import main as derain
 from derain.export.bench.bench_entries import BenchEntry, bench_entries
 from derain.export.bench.cost import Timing, measure_in_process
-from derain.export.machine import versions
+from derain.export.timing import versions
 from derain.files import read_scan, write_scan
 from derain.simulation.sensor import packaged_sensors
 from derain.sources.folders import frame_of

@@ -19,7 +19,7 @@ from pathlib import Path
 
 from derain.datamodules.folder import Folder
 from derain.evaluation.text_tables import markdown_table
-from derain.export.machine import versions
+from derain.export.timing import versions
 
 
 def main() -> None:

@@ -29,7 +29,7 @@ from jsonargparse import ArgumentParser
 
 from derain.datamodules.base import ScanDataModule
 from derain.datamodules.order import Pick
-from derain.export.machine import versions
+from derain.export.timing import versions
 from derain.learning.batch import Batch
 from derain.learning.task import agree_on_task
 from derain.models.base import DerainingModule

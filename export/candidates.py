@@ -78,7 +78,7 @@ def fit_network_candidates(
     if candidates is None:
         raise InputError(
             "--candidates",
-            "no bounds tell rain that the network finds in these scans from the rest",
+            "no bounds separate the rain that the network finds in these scans from the rest",
             "Give scans with rain, or leave it out.",
         )
     if (own := model.spec.candidates) is not None:

@@ -99,14 +99,14 @@ def method_hint(name: str) -> str:
 
 
 def is_method_name(word: str) -> bool:
-    """Whether a method is called so; other packages are asked only if none of derain's is."""
+    """Whether a method has this name; other packages load only if none of derain's has it."""
     return word == DEFAULT or word in FILTERS or word in METHODS
 
 
 def load_method(
     name: str, parameters: Mapping[str, Any], threads: int = 0, runtime: Runtime = Runtime()
 ) -> Method:
-    """Makes a method ready to judge scans, which leaves warnings to who asks for it.
+    """Makes a method ready to judge scans; its warnings are left to the caller.
 
     Args:
         name: ``default``, the model that comes with derain; a filter (one of ``FILTERS``), a method
@@ -127,7 +127,7 @@ def load_method(
 
 
 def _loaded(name: str, parameters: Mapping[str, Any], threads: int, runtime: Runtime) -> Method:
-    # What has a suffix is a file, for which other packages need not be asked.
+    # What has a suffix is a file, for which other packages need not be loaded.
     if name != DEFAULT and not Path(name).suffix:
         if name in FILTERS:
             _refuse_runtime(name, "filter", runtime)

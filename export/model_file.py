@@ -1,6 +1,6 @@
 """The metadata of an ONNX file, read from its bytes without the onnx package.
 
-The file is not trusted: all that derain asks of it is looked at before a network is made of it.
+The file is not trusted: all that derain reads of it is checked before a network is made of it.
 """
 
 from collections.abc import Iterator
@@ -142,15 +142,10 @@ def _parts(message: memoryview, of_number: int) -> Iterator[memoryview]:
 
 
 def _dimensions(tensor: memoryview) -> Iterator[int]:
-    """The sizes of a tensor, which writers give one a field, or all in one."""
+    """The sizes of a tensor."""
     for number, value in _fields(tensor):
         if number == DIMENSIONS and isinstance(value, int):
             yield value
-        elif number == DIMENSIONS and isinstance(value, memoryview):
-            place = 0
-            while place < len(value):
-                size, place = _varint(value, place)
-                yield size
 
 
 def _refuse_changed(path: Path, content: bytes, checksum: Any) -> None:

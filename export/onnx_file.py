@@ -4,7 +4,7 @@ import json
 import logging
 import platform
 import warnings
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -25,6 +25,7 @@ from derain.export.runtimes.session import FLOAT32_PRECISION, Runtime
 from derain.files.atomic import replacing
 from derain.models.base import DerainingModule
 from derain.scan import Scan
+from derain.sources.frame import Frame
 from derain.spec import Spec
 from derain.views.candidates import Bound, Candidates
 from derain.views.channels import extra_channels
@@ -42,7 +43,7 @@ NEGLIGIBLE = 1e-20
 def export(
     model: DerainingModule,
     path: Path,
-    calibration: Collection[Scan] = (),
+    calibration: Sequence[Frame] = (),
     runtime: Runtime = Runtime(),
 ) -> Proof:
     """Exports a model, proves it, and only then puts the file in its place.
@@ -50,8 +51,8 @@ def export(
     Args:
         model: A trained model; its device and training mode are restored.
         path: The ONNX file to write.
-        calibration: Scans like those that the model will see, to export it in eight bits; none
-            exports it in float32. They are gone through twice, one at a time.
+        calibration: Scans like those that the model will see, their intensities in its unit, to
+            export it in eight bits; none exports it in float32. Each is read twice, one at a time.
         runtime: What is to run the file, which is proved by that too where it is not onnxruntime.
 
     Returns:
@@ -129,21 +130,20 @@ def flush_to_zero(proto: onnx.ModelProto) -> int:
 
 
 def _proof(
-    model: DerainingModule, path: Path, calibration: Collection[Scan], runtime: Runtime
+    model: DerainingModule, path: Path, calibration: Sequence[Frame], runtime: Runtime
 ) -> Proof:
     if not calibration:
         bounds = FLOAT32 if runtime.precision == FLOAT32_PRECISION else BF16
         assert bounds.difference is not None
         bounds = replace(bounds, difference=bounds.difference * model.LOGIT_GAIN)
         return prove(model, path, _hard_cases(model.spec), bounds, runtime)
-    # Mapped, for a loop would hold on to one scan while the next is read.
-    seen = prove(model, path, map(_named, calibration), INT8, runtime)
+    seen = prove(model, path, map(_named_scan, calibration), INT8, runtime)
     hard = prove(model, path, _hard_cases(model.spec), FINITE, runtime)
     return Proof(seen.cases + hard.cases)
 
 
-def _named(scan: Scan) -> tuple[str, Scan]:
-    return scan.name, scan
+def _named_scan(frame: Frame) -> tuple[str, Scan]:
+    return frame.name, frame.read()
 
 
 def _hard_cases(spec: Spec) -> Iterator[tuple[str, Scan]]:

@@ -94,6 +94,13 @@ class Case:
         alike = share is None or self.flipped <= max(1, share * self.points)
         return self.finite and near and alike
 
+    def __str__(self) -> str:
+        failed = "" if self.holds else "FAILED "
+        return (
+            f"{failed}{self.name}: {self.points:,} points, {self.threads} threads, "
+            f"largest difference {self.difference:.1e}, {self.flipped} flipped"
+        )
+
 
 @dataclass(frozen=True)
 class Proof:
@@ -101,7 +108,7 @@ class Proof:
 
     Attributes:
         cases: The scans, on each number of threads.
-        by_other: How it compares by a runtime other than onnxruntime, where it was asked for.
+        by_other: How it compares by a runtime other than onnxruntime, where one is named.
     """
 
     cases: tuple[Case, ...]
@@ -110,19 +117,18 @@ class Proof:
     @property
     def holds(self) -> bool:
         """Whether every case does, and both find enough of the same rain."""
-        if self.by_other is not None and not self.by_other.holds:
-            return False
-        return all(case.holds for case in self.cases) and self.finds_enough
+        other_holds = self.by_other is None or self.by_other.holds
+        return other_holds and self.finds_enough and all(case.holds for case in self.cases)
 
     @property
-    def least_rain_iou(self) -> float:
-        """What the IoU of the rain must be; 0 where no case bounds it."""
-        return max((case.bounds.rain_iou or 0.0 for case in self.cases), default=0.0)
+    def least_rain_iou(self) -> float | None:
+        """What the IoU of the rain must be; None where no case bounds it."""
+        return max(filter(None, (case.bounds.rain_iou for case in self.cases)), default=None)
 
     @property
     def finds_enough(self) -> bool:
         """Whether the IoU of the rain is as great as it must be; if it is undefined, it is not."""
-        return not self.least_rain_iou or self.rain_iou >= self.least_rain_iou
+        return self.least_rain_iou is None or self.rain_iou >= self.least_rain_iou
 
     @property
     def rain_iou(self) -> float:
@@ -162,23 +168,20 @@ class Proof:
         }
 
     def __str__(self) -> str:
-        runtime = self.worst.runtime
-        by = "" if runtime == DEFAULT_RUNTIME else f"{runtime}: "
-        lines = [
-            f"{by}{'' if case.holds else 'FAILED '}{case.name}: {case.points:,} points, "
-            f"{case.threads} threads, largest difference {case.difference:.1e}, "
-            f"{case.flipped} flipped"
-            for case in self.cases
-            if not case.holds or case is self.worst
-        ]
+        """The worst case and those that fail, and a summary; each line names another runtime."""
+        lines = [str(case) for case in self.cases if not case.holds or case is self.worst]
         lines.append(
-            f"{by}{len(self.cases)} cases, {self.points:,} points or pixels: largest logit "
+            f"{len(self.cases)} cases, {self.points:,} points or pixels: largest logit "
             f"difference {self.worst.difference:.1e}, {self.flipped} labels flipped, "
             f"IoU of the rain {number_text(self.rain_iou, '.4f')}"
         )
         if not self.finds_enough:
-            lines.append(f"{by}FAILED: the IoU of the rain must be {self.least_rain_iou:g}")
-        return "\n".join(lines if self.by_other is None else [*lines, str(self.by_other)])
+            lines.append(f"FAILED: the IoU of the rain must be {self.least_rain_iou:g}")
+        if self.worst.runtime != DEFAULT_RUNTIME:
+            lines = [f"{self.worst.runtime}: {line}" for line in lines]
+        if self.by_other is not None:
+            lines.append(str(self.by_other))
+        return "\n".join(lines)
 
 
 def prove(

@@ -1,7 +1,7 @@
 """Eight-bit models: smaller, faster on processors with integer dot products, not quite the same."""
 
 import tempfile
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,6 @@ from onnxruntime.quantization import (
 )
 
 from derain.errors import InputError
-from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.views.view import View, ViewedScan
 
@@ -24,37 +23,17 @@ from derain.views.view import View, ViewedScan
 CALIBRATION_SCANS = 16
 
 
-class CalibrationScans(Collection[Scan]):
-    """Scans that are read one at a time, anew whenever they are gone through.
-
-    Args:
-        frames: Their frames, whose intensities are in the unit of the model.
-    """
-
-    def __init__(self, frames: Sequence[Frame]) -> None:
-        self.frames = frames
-
-    def __len__(self) -> int:
-        return len(self.frames)
-
-    def __contains__(self, scan: object) -> bool:
-        return isinstance(scan, Scan) and scan.name in [frame.name for frame in self.frames]
-
-    def __iter__(self) -> Iterator[Scan]:
-        return (frame.read() for frame in self.frames)
-
-
 class CalibrationReader(CalibrationDataReader):  # type: ignore[misc]
     """Gives onnxruntime the network's inputs, scan by scan.
 
     Args:
         view: The network's view.
-        scans: Scans like those that the model will see.
+        frames: Scans like those that the model will see; each is read when its turn comes.
     """
 
-    def __init__(self, view: View, scans: Iterable[Scan]) -> None:
-        # Mapped, for a loop would hold on to one scan while the next is read.
-        self._views: Iterator[ViewedScan] = map(view, scans)
+    def __init__(self, view: View, frames: Sequence[Frame]) -> None:
+        # Not a loop, which would hold on to one scan while the next is read.
+        self._views: Iterator[ViewedScan] = (view(frame.read()) for frame in frames)
 
     def get_next(self) -> dict[str, NDArray[np.generic]] | None:
         """Inputs of the next scan; None after the last."""
@@ -65,8 +44,8 @@ class CalibrationReader(CalibrationDataReader):  # type: ignore[misc]
 def quantised(
     proto: onnx.ModelProto,
     view: View,
-    scans: Iterable[Scan],
-    operators: Sequence[str] = ("Conv",),
+    frames: Sequence[Frame],
+    operators: Sequence[str],
 ) -> onnx.ModelProto:
     """The same model with convolutions, and other operators, that compute in eight bits.
 
@@ -77,7 +56,7 @@ def quantised(
     Args:
         proto: The model in float32.
         view: The network's view.
-        scans: Scans whose activations set the scales.
+        frames: Scans whose activations set the scales, in the unit of the model.
         operators: Names of the operators, in ONNX, that compute in eight bits.
 
     Raises:
@@ -93,7 +72,7 @@ def quantised(
         quantize_static(
             given,
             path,
-            CalibrationReader(view, scans),
+            CalibrationReader(view, frames),
             quant_format=QuantFormat.QDQ,
             op_types_to_quantize=list(operators),
             per_channel=True,

@@ -1,17 +1,19 @@
-"""Timed runs of a method, from file to mask, stage by stage."""
+"""Timed runs of a method, from file to mask, stage by stage, and the machine that they ran on."""
 
+import platform
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+import derain
 from derain.evaluation.hard_cases import scene
-from derain.export.machine import versions
 from derain.export.runtime import Derainer
-from derain.export.runtimes.session import Runtime
+from derain.export.runtimes.session import DEFAULT_RUNTIME, RUNTIMES, Runtime
 from derain.files import DEFAULT_COLUMNS
 from derain.scan import Scan
 from derain.sources.folders import frame_of
@@ -149,3 +151,35 @@ def measure_latency(
         times = timed_runs(derainer.probability, [frame], repeats)
         software = versions([runtime.name])
         return Latency(times, frame.count_points(), derainer.threads, software)
+
+
+def versions(runtimes: Iterable[str] = (DEFAULT_RUNTIME,)) -> str:
+    """The processor, and the versions that a time depends on.
+
+    Args:
+        runtimes: Names of what ran networks.
+    """
+    packages = dict.fromkeys(RUNTIMES[name].PACKAGE for name in runtimes)
+    ran = "".join(f"{_with_version(package)}, " for package in packages)
+    return (
+        f"{processor()}; derain {derain.__version__}, {ran}"
+        f"NumPy {np.__version__}, Python {platform.python_version()}"
+    )
+
+
+def _with_version(package: str) -> str:
+    """A package with its version, as far as it is installed under that name."""
+    try:
+        return f"{package} {version(package)}"
+    except PackageNotFoundError:  # another brings the same modules, as onnxruntime-gpu does
+        return package
+
+
+def processor() -> str:
+    """Name of the processor, as far as it is known."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or platform.machine()

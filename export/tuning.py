@@ -79,27 +79,6 @@ class Tuned:
     default_iou: float
 
 
-@dataclass(frozen=True)
-class Search:
-    """How the best parameters are looked for.
-
-    Attributes:
-        trials: Trials in all, those that the storage holds already included.
-        seed: Of the sampler, which draws the parameters of each trial.
-        storage: Where the trials are kept, so that a later search goes on from them, and one at the
-            same time shares them; None keeps nothing.
-        data: Names of the scans. The trials in a storage count only for the same scans, labelled
-            alike.
-        done: Called after each trial.
-    """
-
-    trials: int
-    seed: int
-    storage: Storage | None
-    data: Sequence[str]
-    done: Callable[[], object]
-
-
 def search_space(name: str) -> Mapping[str, Span]:
     """The spans that the parameters of a filter are searched in.
 
@@ -131,7 +110,14 @@ def neighbours_to_find(name: str) -> int:
     return max(default, int(most))
 
 
-def tune_filter(name: str, scans: Sequence[LabelledNeighbourhoods], search: Search) -> Tuned:
+def tune_filter(
+    name: str,
+    scans: Mapping[str, LabelledNeighbourhoods],
+    trials: int,
+    seed: int = 0,
+    storage: Storage | None = None,
+    after_trial: Callable[[], object] = lambda: None,
+) -> Tuned:
     """Tunes a filter with Optuna's tree-structured Parzen estimator.
 
     The first trial is that of the filter's default parameters. A search may be broken off, even in
@@ -141,8 +127,14 @@ def tune_filter(name: str, scans: Sequence[LabelledNeighbourhoods], search: Sear
 
     Args:
         name: One of ``FILTERS``.
-        scans: Scans with rain in them, with as many neighbours as :func:`neighbours_to_find`.
-        search: How to search.
+        scans: Scans with rain in them, by their names, with as many neighbours as
+            :func:`neighbours_to_find`. The trials in a storage count only for the same scans,
+            labelled alike.
+        trials: Trials in all, those that the storage holds already included.
+        seed: Random seed of the sampler, which draws the parameters of each trial.
+        storage: Where the trials are kept, so that a later search goes on from them, and one at the
+            same time shares them; None keeps nothing.
+        after_trial: Called after each trial.
 
     Raises:
         InputError: A filter that cannot be tuned; a storage that cannot be used, or holds trials on
@@ -159,20 +151,21 @@ def tune_filter(name: str, scans: Sequence[LabelledNeighbourhoods], search: Sear
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     space, default = search_space(name), filter_from(name, {})
     first = {parameter: getattr(default, parameter) for parameter in space}
-    kept = None if search.storage is None else search.storage.open()
-    storage = optuna.storages.get_storage(kept)  # in memory where none is to be kept
+    kept = None if storage is None else storage.open()
+    trials_kept = optuna.storages.get_storage(kept)  # in memory where none is to be kept
+    labelled = list(scans.values())
     try:
-        shared = SharedTrials(storage, name, distributions_of(name), first, search.seed)
-        _agree_on_data(shared.study, name, scans, search)
-        while trial := shared.next(search.trials):
-            shared.finish(trial, pooled_iou(filter_from(name, trial.params), scans))
-            search.done()
+        shared = SharedTrials(trials_kept, name, distributions_of(name), first, seed)
+        _agree_on_data(shared.study, name, scans, storage)
+        while trial := shared.next(trials):
+            shared.finish(trial, pooled_iou(filter_from(name, trial.params), labelled))
+            after_trial()
         parameters, iou = shared.best()
     except (optuna.exceptions.OptunaError, SQLAlchemyError) as error:
-        if search.storage is None:
+        if storage is None:
             raise
-        raise search.storage.refused(error) from error
-    return Tuned(filter_from(name, parameters).as_dict(), iou, pooled_iou(default, scans))
+        raise storage.refused(error) from error
+    return Tuned(filter_from(name, parameters).as_dict(), iou, pooled_iou(default, labelled))
 
 
 def tune_threshold(
@@ -221,7 +214,10 @@ def pooled_iou(filter: PointFilter, scans: Sequence[LabelledNeighbourhoods]) -> 
 
 
 def _agree_on_data(
-    study: "optuna.Study", name: str, scans: Sequence[LabelledNeighbourhoods], search: Search
+    study: "optuna.Study",
+    name: str,
+    scans: Mapping[str, LabelledNeighbourhoods],
+    storage: Storage | None,
 ) -> None:
     """Writes into a study what its trials are computed on, or compares what is there.
 
@@ -229,15 +225,15 @@ def _agree_on_data(
         InputError: The study is of other scans, labels, spans or candidates.
     """
     facts: dict[str, Any] = {
-        "scans": list(search.data),
-        "rain_and_solid": [[int(s.rain.sum()), int(s.solid.sum())] for s in scans],
+        "scans": list(scans),
+        "rain_and_solid": [[int(s.rain.sum()), int(s.solid.sum())] for s in scans.values()],
         "bounds": {k: list(v) for k, v in search_space(name).items()},
     }
-    if not all(s.candidate.all() for s in scans):
-        facts["candidates"] = [int(s.candidate.sum()) for s in scans]
+    if not all(s.candidate.all() for s in scans.values()):
+        facts["candidates"] = [int(s.candidate.sum()) for s in scans.values()]
     if study.trials and study.user_attrs != facts:
         raise InputError(
-            str(search.storage),
+            str(storage),
             f"holds a study of {name} on other scans, labels or candidates",
             "Name another --storage.",
         )

@@ -10,7 +10,7 @@ from pathlib import Path
 from benchmarks.sensor_table.columns import Column, table
 from benchmarks.sensor_table.measure import SIZE, TIME, Measurement
 from derain.export.bench.report import group_of
-from derain.export.machine import processor, versions
+from derain.export.timing import processor, versions
 from derain.files.atomic import replacing
 from derain.pictures.scan_pictures import save
 from derain.pictures.speed_error import Standing, speed_error_figure

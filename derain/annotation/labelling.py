@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from derain.annotation.manifest import label_path
 from derain.cards.card import DataCard
 from derain.errors import InputError
-from derain.evaluation.answers import NOT_KNOWN, TEACHERS_ANSWERS, Answers
-from derain.evaluation.truth_record import TruthRecord
+from derain.evaluation.answers import NOT_KNOWN, TEACHERS_ANSWERS, Answers, TruthRecord
 from derain.files.labels import write_labels
 from derain.files.reading import reading
 from derain.sources.frame import Frame

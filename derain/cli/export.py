@@ -96,7 +96,7 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     require("export", *EXPORT_LIBRARIES)
     from derain.export.onnx_file import export
-    from derain.export.quantisation import CALIBRATION_SCANS, CalibrationScans
+    from derain.export.quantisation import CALIBRATION_SCANS
     from derain.export.timing import measure_latency
     from derain.models.checkpoint import load_model
 
@@ -114,10 +114,10 @@ def main(arguments: argparse.Namespace) -> int:
     frames = named_frames(arguments.calibration, arguments.columns).map(
         lambda frame: frame.with_intensity_times(scale)
     )
-    calibration = CalibrationScans(evenly_spaced(frames, CALIBRATION_SCANS))
+    calibration = evenly_spaced(frames, CALIBRATION_SCANS)
     # The proof does not show scans of another unit: both models judge the same ones.
     notices = Notices()
-    for frame in calibration.frames:
+    for frame in calibration:
         notices.warn(frame.name, model.spec.issues(frame.read()))
     notices.warn_of_repeats()
     if arguments.candidates:

@@ -127,24 +127,27 @@ class IntensityRule:
         if not any(rain.any() for _, _, rain in parts):
             return cls(-np.inf, -np.inf)
         intensity, distance, rain = (np.concatenate(column) for column in zip(*parts, strict=True))
-        # The best limit is a value of the rain itself. Of many values, those at evenly spaced
-        # quantiles are tried.
-        shares = np.linspace(0, 1, MOST_LIMITS)
-        limits = [
-            np.unique(np.quantile(column[rain], shares, method="lower"))
-            for column in (intensity, distance)
-        ]
-        # A point's cell is the pair of the lowest limits that it passes.
-        cells = [
-            np.searchsorted(limit, column)
-            for limit, column in zip(limits, (intensity, distance), strict=True)
-        ]
+        limits = _limits_of(intensity[rain]), _limits_of(distance[rain])
+        # Number of the lowest limit of each kind that a point passes; it passes all above, too.
+        lowest = np.searchsorted(limits[0], intensity), np.searchsorted(limits[1], distance)
         shape = (len(limits[0]) + 1, len(limits[1]) + 1, 2)
-        passing = table_of((*cells, rain.astype(np.int64)), shape).cumsum(axis=0).cumsum(axis=1)
-        false, hits = passing[:-1, :-1].transpose(2, 0, 1)
+        by_lowest = table_of((*lowest, rain.astype(np.int64)), shape)
+        passing = by_lowest.cumsum(axis=0).cumsum(axis=1)[:-1, :-1]  # without those past all limits
+        false, hits = passing[..., 0], passing[..., 1]
         iou = intersection_over_union(hits, rain.sum() - hits + false)
         row, column = np.unravel_index(np.argmax(iou), iou.shape)
         return cls(float(limits[0][row]), float(limits[1][column]))
+
+
+def _limits_of(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Limits to try, ascending, float32 (L,): the best one is a value of the rain itself.
+
+    Args:
+        values: Intensity or range of every point of rain, float32 (R,). Of many, those at evenly
+            spaced quantiles are tried.
+    """
+    shares = np.linspace(0, 1, MOST_LIMITS)
+    return np.unique(np.quantile(values, shares, method="lower"))
 
 
 def _best_called_rain(points: NDArray[np.float64], rain: NDArray[np.float64]) -> NDArray[np.int64]:

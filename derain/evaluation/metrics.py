@@ -10,8 +10,7 @@ from torch import Tensor
 from torchmetrics import Metric
 from torchmetrics.utilities import dim_zero_cat
 
-from derain.evaluation.counts import SCORES, Counts, mean_over_scans
-from derain.evaluation.rain_counts import RainCounts
+from derain.evaluation.counts import SCORES, Counts, RainCounts, mean_over_scans
 from derain.scan import Scan
 
 

@@ -155,19 +155,12 @@ def _reach(scan: Scan, rain: NDArray[np.bool_]) -> float:
 def _draw_by_scan(axes: Axes, scans: Sequence[AnswersOfScan]) -> None:
     """Bars in time order; a line marks the first held-out scan."""
     _draw_shares(axes, np.arange(len(scans)), [scan.answers for scan in scans], width=1.0)
-    kept_back = [place for place, scan in enumerate(scans) if scan.held_out]
-    if kept_back:
-        axes.axvline(kept_back[0] - 0.5, color=STUDENT, linestyle=":")
-        axes.annotate(
-            "held out",
-            (kept_back[0] - 0.5, 1),
-            (4, -2),
-            xycoords=("data", "axes fraction"),
-            textcoords="offset points",
-            color=STUDENT,
-            va="top",
-            fontsize=9,
-        )
+    held_out = [place for place, scan in enumerate(scans) if scan.held_out]
+    if held_out:
+        start = held_out[0] - 0.5
+        axes.axvline(start, color=STUDENT, linestyle=":")
+        at_top = axes.get_xaxis_transform()
+        axes.text(start, 0.99, " held out", transform=at_top, color=STUDENT, va="top", fontsize=9)
     axes.set_xlim(-0.5, len(scans) - 0.5)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlabel("scan, in time order")

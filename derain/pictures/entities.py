@@ -11,9 +11,7 @@
 - ``/caption``: the scan's name, and what the colours mean.
 """
 
-import numpy as np
 import rerun
-from numpy.typing import NDArray
 
 from derain.pictures import palette
 from derain.pictures.palette import OUTCOMES, rgb
@@ -68,24 +66,6 @@ class MethodEntities:
         self.iou = f"{IOU}/{below_methods}"
 
 
-class LabelEntities:
-    """Paths of what labels hold.
-
-    Args:
-        name: Name of the labels: ``truth``, or ``teacher``.
-
-    Attributes:
-        points: Points labelled as rain, and points whose label is unknown.
-        share: Share of rain in the points, per cent.
-        share_not_known: Share of points whose label is unknown, per cent.
-    """
-
-    def __init__(self, name: str) -> None:
-        self.points = f"{SCAN}/{name}"
-        self.share = f"{SHARE}/scan/{name}"
-        self.share_not_known = f"{self.share}_not_known"
-
-
 def classes() -> rerun.AnnotationContext:
     """Names and colours of the classes."""
     coloured = {**OUTCOMES, "rain": palette.RAIN, "not known": palette.MISSED}
@@ -94,12 +74,3 @@ def classes() -> rerun.AnnotationContext:
         for number, (name, colour) in enumerate(coloured.items(), CLASS_KEPT)
     ]
     return rerun.AnnotationContext([rerun.AnnotationInfo(NOTHING, "", (0, 0, 0, 0)), *named])
-
-
-def class_of(outcome: NDArray[np.int64]) -> NDArray[np.uint16]:
-    """Class of each point by its outcome, uint16 (N,).
-
-    Args:
-        outcome: Numbers of ``OUTCOMES``, int64 (N,).
-    """
-    return (outcome + CLASS_KEPT).astype(np.uint16)

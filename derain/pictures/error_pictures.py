@@ -8,14 +8,11 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from derain.evaluation.counts import ClassCounts
 from derain.evaluation.operating_points import OperatingPoints
-from derain.evaluation.rain_counts import ClassCounts
 from derain.evaluation.text_tables import number_text
 from derain.pictures.palette import LOST, MISSED
 from derain.pictures.scan_pictures import legend_below
-
-# Most rows of a table of classes; the last sums up all further classes.
-MOST_CLASSES = 14
 
 # Shares with the darkest and the lightest colour: errors span decades.
 DARKEST, LIGHTEST = 1.0, 1e-4
@@ -83,24 +80,13 @@ def operating_points_figure(points: OperatingPoints, threshold: float, title: st
 
 def _rows(counts: Mapping[str, Sequence[ClassCounts]]) -> dict[str, list[ClassCounts]]:
     """The rows of the table, each with its total at the end; only classes with points."""
-    rows = {name: [*cells, _total(cells)] for name, cells in counts.items()}
-    filled = {name: row for name, row in rows.items() if row[-1].points}
-    order = sorted(filled, key=lambda name: (not filled[name][-1].rain, -filled[name][-1].wrong))
-    if len(order) > MOST_CLASSES:
-        order, others = order[: MOST_CLASSES - 1], order[MOST_CLASSES - 1 :]
-        columns = zip(*(filled[name] for name in others), strict=True)
-        filled[f"{len(others)} others"] = [_total(column) for column in columns]
-        order.append(f"{len(others)} others")
-    return {_title(name, filled[name][-1]): filled[name] for name in order}
-
-
-def _title(name: str, total: ClassCounts) -> str:
-    return f"{name} (rain)" if total.rain and name != "rain" else name
-
-
-def _total(cells: Sequence[ClassCounts]) -> ClassCounts:
-    first, *others = cells
-    return sum(others, first)
+    rows = {}
+    for name, (first, *others) in counts.items():
+        total = sum(others, first)
+        title = f"{name} (rain)" if total.rain and name != "rain" else name
+        if total.points:
+            rows[title] = [first, *others, total]
+    return dict(sorted(rows.items(), key=lambda row: (not row[1][-1].rain, -row[1][-1].wrong)))
 
 
 def _colour(cell: ClassCounts) -> tuple[float, ...]:

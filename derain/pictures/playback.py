@@ -16,8 +16,7 @@ from derain.pictures import entities, palette
 from derain.pictures.entities import MethodEntities
 from derain.pictures.playback_layout import layout, write_static
 from derain.pictures.recording_file import RecordingFile, recording_file
-from derain.pictures.selection import LabelledRain, Labels, Selection
-from derain.pictures.sensor_look import PER_METRE, SensorLook
+from derain.pictures.selection import PER_METRE, LabelledRain, Labels, Selection
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
@@ -58,13 +57,12 @@ def write_playback(
         InputError: The file cannot be written; no scan can be read; one cannot, and the guard does
             not hold the error back.
     """
-    look = SensorLook.of(selection.frames)
     first = selection.frames[0]
     name = printable(first.sequence or Path(first.name).name)
     opened_with = layout(methods, labels, placed=bool(selection.poses))
     with recording_file(path, name, opened_with) as file:
         write_static(file, selection, labels, methods)
-        writer = PlaybackWriter(file, selection, look, labels)
+        writer = PlaybackWriter(file, selection, labels)
         _write_scans(writer, selection, guard)
         for title, method in methods.items():
             missing = {frame.key: frame for frame in selection.frames}
@@ -102,13 +100,11 @@ class PlaybackWriter:
     Attributes:
         file: The file to write to.
         selection: The scans shown.
-        look: How they are drawn.
         labels: Labels of the scans; None where there are none.
     """
 
     file: RecordingFile
     selection: Selection
-    look: SensorLook
     labels: Labels | None
 
     def write_scan(self, frame: Frame) -> None:
@@ -127,14 +123,15 @@ class PlaybackWriter:
             pose = self.selection.poses[frame.key]
             placed = rerun.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3])
             self.file.log(entities.SENSOR, placed)
-        colours = self.look.colours(scan)[scan.valid]
+        look = self.selection.look
+        colours = look.colours(scan)[scan.valid]
         self.file.log(entities.POINTS, rerun.Points3D(scan.xyz[scan.valid], colors=colours))
-        if self.look.view is not None:
+        if look.view is not None:
             image = rerun.DepthImage(
-                self.look.centimetres(self.look.view(scan)),
+                look.centimetres(look.view(scan)),
                 meter=PER_METRE,
                 colormap="grayscale",
-                depth_range=(0, self.look.farthest * PER_METRE),
+                depth_range=(0, look.farthest * PER_METRE),
             )
             self.file.log(entities.RANGES, image)
         if self.labels is not None:
@@ -155,7 +152,8 @@ class PlaybackWriter:
         assert frame is not None  # the method was given frames, not points
         place = MethodEntities(title)
         labelled = None if self.labels is None else self.labels.of(frame, scan)
-        classed = entities.class_of(palette.outcomes(rain, _truth(labelled, rain)))
+        outcome = palette.outcomes(rain, _truth(labelled, rain))
+        classed = (outcome + entities.CLASS_KEPT).astype(np.uint16)
         self._set_time(frame)
         for entity, rows in ((place.kept, scan.valid & ~rain), (place.removed, rain)):
             self.file.log(entity, rerun.Points3D(scan.xyz[rows], class_ids=classed[rows]))
@@ -165,11 +163,11 @@ class PlaybackWriter:
             rows = judgement.probability >= LEAST_PROBABILITY
             colours = palette.shades(palette.PROBABILITY, judgement.probability[rows])
             self.file.log(place.probability, rerun.Points3D(scan.xyz[rows], colors=colours))
-        if self.look.view is not None:
-            winner = self.look.view(scan).winner
+        if (view := self.selection.look.view) is not None:
+            winner = view(scan).winner
             kept = classed == entities.CLASS_KEPT
             coloured = np.append(np.where(kept, entities.NOTHING, classed), entities.NOTHING)
-            image = coloured[winner].reshape(self.look.view.grid.rows, -1)
+            image = coloured[winner].reshape(view.grid.rows, -1)
             self.file.log(place.image, rerun.SegmentationImage(image.astype(np.uint8)))
         self._write_share(place.share, rain, scan)
 
@@ -185,17 +183,16 @@ class PlaybackWriter:
         self._clear(place.all, place.image, place.share, place.iou)
 
     def _write_labels(self, labels: Labels, scan: Scan, found: LabelledRain | None) -> None:
-        place = labels.entities
         if found is None:
-            self._clear(place.points, place.share, place.share_not_known)
+            self._clear(labels.points, labels.share, labels.share_not_known)
             return
         shown = scan.valid & (found.rain | ~found.known)
         classed = np.where(found.rain[shown], entities.CLASS_RAIN, entities.CLASS_NOT_KNOWN)
         points = rerun.Points3D(scan.xyz[shown], class_ids=classed.astype(np.uint16))
-        self.file.log(place.points, points)
-        self._write_share(place.share, found.rain, scan)
+        self.file.log(labels.points, points)
+        self._write_share(labels.share, found.rain, scan)
         if labels.card.unknown:
-            self._write_share(place.share_not_known, ~found.known, scan)
+            self._write_share(labels.share_not_known, ~found.known, scan)
 
     def _write_errors(
         self, place: MethodEntities, judgement: Judgement, found: LabelledRain | None

@@ -49,7 +49,7 @@ def layout(methods: Mapping[str, Method], labels: Labels | None, placed: bool) -
 
 def _clouds(methods: Mapping[str, Method], labels: Labels | None, placed: bool) -> views.Tabs:
     """The point clouds: tabs of what is removed, kept, and probable, the methods side by side."""
-    scan = [entities.POINTS] if labels is None else [entities.POINTS, labels.entities.points]
+    scan = [entities.POINTS] if labels is None else [entities.POINTS, labels.points]
     first = "scan" if labels is None else f"scan and {labels.name}"
     places = {title: MethodEntities(title) for title in methods}
     removed = [_cloud(title, [m.kept, m.removed, m.missed], placed) for title, m in places.items()]
@@ -118,9 +118,8 @@ def _curves(labels: Labels | None) -> views.Horizontal:
     text = views.TextDocumentView(origin=entities.CAPTION, name="Scan")
     if labels is None:
         return views.Horizontal(shares, text, column_shares=[3, 1])
-    iou = _curve(
-        entities.IOU, f"IoU with the {labels.name}", legend=False
-    )  # colours as in the shares
+    # Its lines have the colours of the shares.
+    iou = _curve(entities.IOU, f"IoU with the {labels.name}", legend=False)
     return views.Horizontal(shares, iou, text, column_shares=[3, 3, 2])
 
 
@@ -147,10 +146,9 @@ def write_static(
         path = rerun.LineStrips3D(selection.paths, colors=rgb(palette.SOLID), radii=LARGE)
         file.log(entities.TRAJECTORY, path, static=True)
     if labels is not None:
-        of_labels = labels.entities
-        _sized(file, LARGE, [of_labels.points])
-        _line(file, of_labels.share, labels.name, palette.SOLID)
-        _line(file, of_labels.share_not_known, f"not known to the {labels.name}", palette.MISSED)
+        _sized(file, LARGE, [labels.points])
+        _line(file, labels.share, labels.name, palette.SOLID)
+        _line(file, labels.share_not_known, f"not known to the {labels.name}", palette.MISSED)
     for number, title in enumerate(methods):
         place = MethodEntities(title)
         _sized(file, SMALL, [place.kept])

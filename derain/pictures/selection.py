@@ -1,21 +1,39 @@
-"""The scans of a recording that are shown: when and where each was taken, and its labels."""
+"""The scans of a recording that are shown: when and where each was taken, how, and its labels."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from derain.cards.card import DataCard
 from derain.errors import InputError
-from derain.pictures.entities import LabelEntities
+from derain.pictures.entities import SCAN, SHARE
+from derain.pictures.palette import shades
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.method import Method
 from derain.sources.reader import FrameReader
 from derain.sources.source import Source
+from derain.sources.spread import evenly_spaced
+from derain.views.grid_fit import fit_grid
+from derain.views.range_image import RangeImage, RangeView
+
+# Scans, spread over the recording, that brightness and grid are taken from.
+LOOKED_AT = 4
+
+# From dark to bright; the colours of classes stand out from them.
+GREYS = ("#404040", "#f0f0f0")
+
+# Shade of scans without intensities.
+EVEN_GREY = 0.35
+
+# Pixels of range images count centimetres, which 16 bits hold up to 655 m.
+PER_METRE = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +117,11 @@ class Selection:
         return placed
 
     @cached_property
+    def look(self) -> "SensorLook":
+        """How the scans are drawn."""
+        return SensorLook.of(self.frames)
+
+    @cached_property
     def paths(self) -> list[NDArray[np.float32]]:
         """The sensor's path in each sequence, float32 (scans, 3), metres."""
         paths: dict[str, list[NDArray[np.float64]]] = {}
@@ -106,6 +129,54 @@ class Selection:
             if frame.key in self.poses:
                 paths.setdefault(frame.sequence, []).append(self.poses[frame.key][:3, 3])
         return [np.array(path, np.float32) for path in paths.values()]
+
+
+@dataclass(frozen=True)
+class SensorLook:
+    """How scans of one sensor are drawn.
+
+    Attributes:
+        brightest: Intensity that is drawn white, in the unit of the scans.
+        farthest: Range that is drawn white, metres.
+        view: Makes their range images; None where no scan has a valid point.
+    """
+
+    brightest: float
+    farthest: float
+    view: RangeView | None
+
+    @classmethod
+    def of(cls, frames: Sequence[Frame]) -> Self:
+        """Takes the look from some scans of a recording.
+
+        Args:
+            frames: Its frames, one or more; those that cannot be read are skipped.
+        """
+        scans = []
+        for frame in evenly_spaced(frames, LOOKED_AT):
+            with suppress(InputError):  # reported when the frame is written
+                scans.append(frame.read())
+        intensities = [s.intensity[s.valid] for s in scans if s.intensity is not None]
+        ranges = [scan.range[scan.valid] for scan in scans]
+        try:
+            view = RangeView(fit_grid(scans).grid, channels=())
+        except InputError:  # no valid point
+            view = None
+        return cls(_nearly_all(intensities), _nearly_all(ranges), view)
+
+    def colours(self, scan: Scan) -> NDArray[np.uint8]:
+        """Shades of grey by intensity, uint8 (N, 3)."""
+        if scan.intensity is None:
+            return shades(GREYS, np.full(len(scan), EVEN_GREY))
+        with np.errstate(invalid="ignore"):
+            brightness = np.nan_to_num(scan.intensity) / self.brightest
+            return shades(GREYS, np.sqrt(np.clip(brightness, 0, 1)))
+
+    def centimetres(self, seen: RangeImage) -> NDArray[np.uint16]:
+        """The range of each pixel, uint16 (H, W), centimetres; 0 where nothing returned."""
+        ranges = np.where(seen.valid, seen.nearest, 0) * PER_METRE
+        pixels: NDArray[np.uint16] = np.clip(ranges, 0, 65535).round().astype(np.uint16)
+        return pixels
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,9 +205,19 @@ class Labels:
     name: str = "truth"
 
     @property
-    def entities(self) -> LabelEntities:
-        """Paths of their entities."""
-        return LabelEntities(self.name)
+    def points(self) -> str:
+        """Entity of the points labelled as rain, and of those whose label is unknown."""
+        return f"{SCAN}/{self.name}"
+
+    @property
+    def share(self) -> str:
+        """Entity of the share of rain in the points, per cent."""
+        return f"{SHARE}/scan/{self.name}"
+
+    @property
+    def share_not_known(self) -> str:
+        """Entity of the share of points whose label is unknown, per cent."""
+        return f"{self.share}_not_known"
 
     def of(self, frame: Frame, scan: Scan) -> LabelledRain | None:
         """The labels of a scan; None where it has none.
@@ -152,3 +233,9 @@ class Labels:
             return None
         labelled = FrameReader(self.card).with_labels(scan, frame)
         return LabelledRain(self.card.rain_of(labelled), ~self.card.unknown_of(labelled))
+
+
+def _nearly_all(values: Sequence[NDArray[np.float32]]) -> float:
+    """The 98th percentile, above 0; 1 of no values."""
+    together = np.concatenate(values) if values else np.zeros(0)
+    return max(float(np.percentile(together, 98)), 1e-6) if len(together) else 1.0

@@ -7,7 +7,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.path import Path
 from matplotlib.ticker import FuncFormatter
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
@@ -27,9 +26,6 @@ OFFSETS = np.concatenate([distance * DIRECTIONS for distance in DISTANCES])
 SIDES = np.tile(DIRECTIONS.round().astype(int), (len(DISTANCES), 1))
 
 FONT_SIZE, POINTS_PER_INCH = 9, 72
-
-# Covering the line of the front counts as much as being so many distances farther off.
-STEPS_TO_AVOID_FRONT = 2
 
 
 @dataclass(frozen=True)
@@ -118,7 +114,7 @@ def speed_error_figure(standings: Sequence[Standing], title: str) -> Figure:
 
 def _label(axes: Axes, standings: Sequence[Standing]) -> None:
     """Writes each label where it covers no marker and no other label, nearest to its own marker."""
-    markers, front = (_on_screen(axes, some) for some in (standings, pareto_front(standings)))
+    markers = axes.transData.transform([standing.place for standing in standings])
     legend = axes.get_legend()
     assert legend is not None
     taken = [Bbox.from_bounds(x - 5, y - 5, 10, 10) for x, y in markers]
@@ -127,23 +123,17 @@ def _label(axes: Axes, standings: Sequence[Standing]) -> None:
         size = _size(axes, standing.label)
         anchors = markers[number] + OFFSETS * axes.figure.dpi / POINTS_PER_INCH
         boxes = [Bbox([low, low + size]) for low in anchors - size * (1 - SIDES) / 2]
-        costs = np.full(len(boxes), np.inf)
+        chosen = 0  # where no place is free, the first: it covers others
         for place, box in enumerate(boxes):
-            step = place // len(DIRECTIONS)
             inside = all(map(axes.bbox.contains, *box.corners().T))
             # A label without a line to its marker is taken for that of the nearest marker.
             gaps = _gaps(box, markers)
-            clear = step > 0 or gaps[number] == gaps.min()
+            clear = place >= len(DIRECTIONS) or gaps[number] == gaps.min()
             if inside and clear and not box.count_overlaps(taken):
-                costs[place] = step + STEPS_TO_AVOID_FRONT * _meets(front, box)
-        best = int(costs.argmin())  # where none is free, the first: it covers others
-        _annotate(axes, standing, best)
-        taken.append(boxes[best])
-
-
-def _on_screen(axes: Axes, standings: Sequence[Standing]) -> NDArray[np.float64]:
-    """Markers of some methods, float64 (n, 2), pixels."""
-    return axes.transData.transform([standing.place for standing in standings])
+                chosen = place
+                break
+        _annotate(axes, standing, chosen)
+        taken.append(boxes[chosen])
 
 
 def _size(axes: Axes, label: str) -> NDArray[np.float64]:
@@ -152,11 +142,6 @@ def _size(axes: Axes, label: str) -> NDArray[np.float64]:
     size = np.array(text.get_window_extent().size)
     text.remove()
     return size
-
-
-def _meets(line: NDArray[np.float64], box: Bbox) -> bool:
-    """Whether a line through places, (n, 2), meets a box."""
-    return len(line) > 1 and bool(Path(line).intersects_bbox(box, filled=False))
 
 
 def _gaps(box: Bbox, places: NDArray[np.float64]) -> NDArray[np.float64]:

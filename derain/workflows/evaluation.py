@@ -13,10 +13,17 @@ from derain.cards.card import DataCard, load_card
 from derain.cards.known import label_of, layouts_for
 from derain.datamodules.taught import Taught
 from derain.errors import InputError
-from derain.evaluation.answers import NOT_KNOWN, RAIN, Answers, AnswersOfScan, answer_of, total
+from derain.evaluation.answers import (
+    NOT_KNOWN,
+    RAIN,
+    Answers,
+    AnswersOfScan,
+    TruthRecord,
+    answer_of,
+    total,
+)
 from derain.evaluation.counts import SCORES
 from derain.evaluation.text_tables import markdown_table, number_text
-from derain.evaluation.truth_record import TruthRecord
 from derain.pictures.answers import answers_figure
 from derain.pictures.scan_pictures import before_after_figure, save
 from derain.recordings.persistence import PersistenceDerainer

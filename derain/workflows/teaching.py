@@ -7,8 +7,7 @@ from derain.annotation.labelling import LabelledScan
 from derain.annotation.manifest import HELD_OUT_PART, Manifest
 from derain.annotation.teach import Watch, teach
 from derain.cards.card import DataCard
-from derain.evaluation.answers import Answers
-from derain.evaluation.truth_record import TruthRecord
+from derain.evaluation.answers import Answers, TruthRecord
 from derain.jobs.running import Submits
 from derain.sources.judging import Guard, unguarded
 from derain.sources.method import Method

@@ -15,7 +15,6 @@ from derain.export.runtime import Derainer
 from derain.export.storage import Storage
 from derain.export.tuning import (
     LabelledNeighbourhoods,
-    Search,
     Tuned,
     neighbours_to_find,
     tune_filter,
@@ -85,15 +84,14 @@ def tune_filter_on(
     if storage is not None:
         storage.open()  # before the neighbours are found, which takes long
     notices, default, neighbours = Notices(), filter_from(name, {}), neighbours_to_find(name)
-    scans = []
+    scans = {}
     for frame in tqdm(frames, desc="finding neighbours", unit="scan", disable=None):
         scan = _read(data, default, notices, frame)
-        scans.append(LabelledNeighbourhoods.of(scan, data.card, neighbours, threads, candidates))
-    require_rain(any(scan.rain.any() for scan in scans), data.card, "--data")
+        found = LabelledNeighbourhoods.of(scan, data.card, neighbours, threads, candidates)
+        scans[frame.name] = found
+    require_rain(any(scan.rain.any() for scan in scans.values()), data.card, "--data")
     with tqdm(desc="tuning", unit="trial", total=trials, disable=None) as progress:
-        names = [frame.name for frame in frames]
-        search = Search(trials, seed, storage, names, progress.update)
-        tuned = tune_filter(name, scans, search)
+        tuned = tune_filter(name, scans, trials, seed, storage, progress.update)
     notices.warn_of_repeats()
     if candidates is None:
         return tuned

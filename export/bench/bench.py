@@ -20,9 +20,9 @@ from derain.export.bench.cost import Timing, measure_cost
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.export.bench.report import draw_speed_error, main_table, runtimes_table, write_report
 from derain.export.bench.rows import Row, bench_rows
-from derain.export.machine import processor, versions
 from derain.export.runtime import Derainer
 from derain.export.runtimes.session import DEFAULT_RUNTIME, FLOAT32_PRECISION, Runtime
+from derain.export.timing import processor, versions
 from derain.files import DEFAULT_COLUMNS
 from derain.filters import PointFilter
 from derain.filters.point_filter import filter_view, rain_among, rows_of

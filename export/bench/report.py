@@ -28,12 +28,12 @@ READING = """\
 - `-` is a score that is undefined: precision where no point was called rain, recall where none is
   rain, F1 and IoU where neither holds. A mean over scans is over the scans that have the score.
 - `IoU 95 %` is the bootstrap interval over scans, `behind best` that of the difference to the best
-  IoU, on the same draws: one that reaches 0 says that these scans do not tell the two apart. Scans
-  that follow each other are alike, which makes both too narrow.
+  IoU, on the same draws: one that reaches 0 does not separate the two on these scans. Scans that
+  follow each other are alike, which makes both too narrow.
 - ms are from file to mask, median and 95th percentile, each method alone in a process of its own
   and no search for neighbours shared. MiB is that process's largest resident memory, Python and its
   libraries included.
-- `position` knows only where rain was in the training scans, `intensity` only that rain is dim and
+- `position` uses only where rain was in the training scans, `intensity` only that rain is dim and
   near; `all` and `none` look at nothing. A method that does not beat them has learnt nothing."""
 
 
@@ -76,7 +76,7 @@ def as_csv(rows: Sequence[Row]) -> str:
 
 
 def as_markdown(rows: Sequence[Row], facts: Mapping[str, Any]) -> str:
-    """Tables of the whole, of classes, ranges, rain rates, sensors and stages."""
+    """Tables of the whole, of classes, ranges, rain rates and stages."""
     points = sum(vars(rows[0].scores.pooled).values())
     parts = [
         f"# {facts['title']}, {points:,} points",
@@ -93,8 +93,6 @@ def as_markdown(rows: Sequence[Row], facts: Mapping[str, Any]) -> str:
     ]
     if rows[0].scores.by_rain_rate:
         parts += ["## IoU by rain rate", _groups(rows, lambda row: row.scores.by_rain_rate)]
-    if rows[0].scores.by_sensor:
-        parts += ["## IoU by sensor", _groups(rows, lambda row: row.scores.by_sensor)]
     parts += ["## Milliseconds by stage, median and 95th percentile", _by_stage(rows)]
     if changed := facts.get("runtimes"):
         parts += ["## What another runtime changes", runtimes_table(changed), OTHER_RUNTIMES]

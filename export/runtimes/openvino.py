@@ -19,9 +19,9 @@ DEVICE = "CPU"
 # The package by which OpenVINO reports that it was imported.
 TELEMETRY = "openvino_telemetry"
 
-# What OpenVINO calls a precision, and which of the processor's capabilities that takes. Asked for
-# bfloat16 where there is none, it imitates it with AVX-512, which takes twice as long as float32,
-# and with AVX2 computes in float32 without saying so.
+# OpenVINO's name of a precision, and the capability of a processor that it needs. For bfloat16 on a
+# processor without it, OpenVINO imitates it with AVX-512, which takes twice as long as float32, and
+# with AVX2 computes in float32 without notice.
 PRECISIONS = {FLOAT32_PRECISION: ("f32", "FP32"), "bf16": ("bf16", "BF16")}
 
 # Kernels that OpenVINO keeps for sizes of inputs it has seen. In bfloat16 it makes some for every

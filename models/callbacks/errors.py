@@ -7,9 +7,8 @@ import numpy as np
 from lightning.pytorch.loggers import TensorBoardLogger
 from numpy.typing import NDArray
 
-from derain.evaluation.counts import band_names
+from derain.evaluation.counts import RainCounts, band_names
 from derain.evaluation.operating_points import CURVE_THRESHOLDS, OperatingPoints
-from derain.evaluation.rain_counts import RainCounts
 from derain.models.base import DerainingModule
 from derain.models.callbacks.drawn_epochs import DrawnEpochs
 from derain.pictures.error_pictures import errors_figure, operating_points_figure

@@ -1,6 +1,6 @@
 """``derain export``: a checkpoint in, a proved and timed ONNX file out, or one line."""
 
-from collections.abc import Collection
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from derain.files import read_scan
 from derain.models.base import DerainingModule
 from derain.models.checkpoint import save_model
 from derain.scan import Scan
+from derain.sources.frame import Frame
 
 
 @pytest.mark.usefixtures("one_block")
@@ -80,10 +81,10 @@ def brightest(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     found: list[float] = []
 
     def export(
-        model: DerainingModule, path: Path, calibration: Collection[Scan], runtime: Runtime
+        model: DerainingModule, path: Path, calibration: Sequence[Frame], runtime: Runtime
     ) -> str:
         path.touch()
-        found[:] = [scan.intensity.max() for scan in calibration]
+        found[:] = [frame.read().intensity.max() for frame in calibration]
         return "proof"
 
     monkeypatch.setattr(onnx_file, "export", export)

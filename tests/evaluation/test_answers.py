@@ -1,7 +1,10 @@
-"""Answers of teacher and student are counted point by point."""
+"""Answers of teacher and student are counted point by point, by range and beside the truth."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from derain.cards.card import DataCard
 from derain.evaluation.answers import (
@@ -10,15 +13,18 @@ from derain.evaluation.answers import (
     NOT_RAIN,
     RAIN,
     Answers,
+    TruthRecord,
     answer_of,
     total,
 )
 from derain.evaluation.counts import Counts
+from derain.evaluation.hard_cases import scene
 from derain.scan import Scan
+from derain.sources.frame import MemoryFrame
 
 
 @pytest.fixture
-def asked(scans: list[Scan]) -> list[tuple[Scan, np.ndarray]]:
+def judged(scans: list[Scan]) -> list[tuple[Scan, np.ndarray]]:
     """Labelled scans, with rows that cannot be judged, and what a student calls rain in them."""
     rng = np.random.default_rng(0)
     for scan in scans:
@@ -28,23 +34,23 @@ def asked(scans: list[Scan]) -> list[tuple[Scan, np.ndarray]]:
 
 
 def test_every_point_that_can_be_judged_is_counted_once(
-    asked: list[tuple[Scan, np.ndarray]], card: DataCard
+    judged: list[tuple[Scan, np.ndarray]], card: DataCard
 ) -> None:
-    answers = total([Answers.of(scan, card, called) for scan, called in asked])
+    answers = total([Answers.of(scan, card, called) for scan, called in judged])
     expected = np.zeros_like(answers.table)
-    for scan, called in asked:
+    for scan, called in judged:
         answer = answer_of(scan, card)
         for row in np.flatnonzero(scan.valid):
             band = max(i for i, edge in enumerate(FINE_EDGES) if scan.range[row] >= edge)
             expected[band, answer[row], int(called[row])] += 1
     np.testing.assert_array_equal(answers.table, expected)
-    assert answers.points == sum(scan.valid.sum() for scan, _ in asked)
+    assert answers.points == sum(scan.valid.sum() for scan, _ in judged)
 
 
 def test_shares_and_agreement_are_those_of_the_points(
-    asked: list[tuple[Scan, np.ndarray]], card: DataCard
+    judged: list[tuple[Scan, np.ndarray]], card: DataCard
 ) -> None:
-    scan, called = asked[0]
+    scan, called = judged[0]
     answers = Answers.of(scan, card, called)
     valid, answer = scan.valid, answer_of(scan, card)
     for number in (NOT_RAIN, RAIN, NOT_KNOWN):
@@ -74,3 +80,44 @@ def test_the_table_has_a_row_for_each_band_and_one_for_all() -> None:
     assert rows[-1] == ["all", "12", "33.3%", "33.3%", "33.3%"]
     assert (answers + answers).rain == 4
     assert str(Answers.none()).splitlines()[-1].split() == ["all", "0", "-", "-", "-"]
+
+
+YARD = DataCard("yard", {0: "wall", 1: "drop", 2: "car", 9: "nobody knows"}, (1,), (9,))
+
+#               called rain: 1     sure: 1
+TRUTH = np.array([1, 1, 1, 1, 0, 0, 0, 2, 2, 9])
+CALLED = np.array([1, 1, 0, 1, 0, 0, 1, 1, 0, 1], bool)
+SURE = np.array([1, 0, 1, 1, 1, 1, 0, 1, 1, 1], bool)
+
+
+EVERY = np.ones(len(TRUTH), bool)
+FRAME = MemoryFrame(key="0", scan=Scan.of(scene(len(TRUTH))).with_label(TRUTH))
+
+
+def record_of(card: DataCard, rows: NDArray[np.int64], sure: NDArray[np.bool_]) -> TruthRecord:
+    """A record of one scan that has these rows of the points above."""
+    record, scan = TruthRecord(card), FRAME.scan.take(rows)
+    answers = (CALLED[rows], EVERY[rows]), (CALLED[rows], sure[rows])
+    record.add(MemoryFrame(key="0", scan=scan), scan, *answers)
+    return record
+
+
+def test_all_points_and_sure_ones_are_counted_apart() -> None:
+    rows = np.arange(len(TRUTH))
+    lines = str(record_of(YARD, rows, SURE)).splitlines()
+    # All: 4 drops, 3 found, 2 others called so. Sure: 3 drops, 2 found, 1 other.
+    assert lines[1].split() == ["all", "points", "9", "0.600", "0.750", "0.500"]
+    assert lines[2].split()[-4:] == ["7", "0.667", "0.667", "0.500"]
+    assert [line.split() for line in lines[4:]] == [
+        ["wall", "3", "33.33%", "0.00%"],
+        ["drop", "(rain)", "4", "75.00%", "66.67%"],
+        ["car", "2", "50.00%", "50.00%"],
+    ]
+    without_doubt = str(record_of(YARD, rows, EVERY)).splitlines()
+    assert without_doubt[2].split()[-4:] == lines[1].split()[-4:]
+
+
+def test_points_at_one_position_count_once_where_the_card_says_so() -> None:
+    twice = np.tile(np.arange(len(TRUTH)), 2)
+    for card, points in ((YARD, "18"), (replace(YARD, deduplicate=True), "9")):
+        assert str(record_of(card, twice, SURE)).splitlines()[1].split()[2] == points

@@ -57,24 +57,6 @@ def test_no_other_choice_by_share_is_better_on_the_training_scans(scans: list[Tr
     assert iou(predicted, rain) == max(iou(choice, rain) for choice in by_share)
 
 
-def test_a_few_points_prove_less_than_many() -> None:
-    # One of three points less than seven of twenty: the first voxel is called rain like the third.
-    voxels, rain = [3, 3, 20, 3, 5], [1, 2, 7, 3, 5]
-    scans = [
-        in_voxels([voxel] * points, [True] * wet + [False] * (points - wet))
-        for voxel, (points, wet) in enumerate(zip(voxels, rain, strict=True))
-    ]
-    prior = PositionPrior.learn(scans)
-    seen = in_voxels([0, 1, 2, 3, 4, 5, 10**9], [False] * 7)[0]  # the last two by no training scan
-    assert prior(seen).tolist() == [True] * 5 + [False] * 2
-
-
-def test_voxels_end_at_their_edges_on_either_side_of_the_sensor() -> None:
-    points = np.array([[-0.01, 0, 5], [0.01, 0, 5], [-0.49, 0.4, 5.4], [-0.51, 0, 5]], np.float32)
-    prior = PositionPrior.learn([(Scan.of(points[:1]), np.ones(1, bool))])
-    assert prior(Scan.of(points)).tolist() == [True, False, True, False]
-
-
 def test_hard_scans_get_an_answer_and_points_that_cannot_be_judged_teach_nothing() -> None:
     for name, scan in hard_cases(largest=5000):
         rain = np.random.default_rng(0).random(len(scan)) < 0.5
@@ -113,12 +95,6 @@ def test_no_other_rule_is_better_than_the_best(
         assert iou(found, rain) == max(iou(rule, rain) for row in dim for rule in row & near)
     else:
         assert not found.any()
-
-
-def test_dim_and_near_points_that_can_be_judged_are_rain() -> None:
-    points = [[1, 0, 0, 5], [0, 3, 0, 5], [0, 0, 2, 6], [2, 0, 0, 5.5], [np.nan, 0, 0, 0]]
-    rain = IntensityRule(intensity=5.5, range=2)(Scan.of(np.array([*points, [0] * 4, [-1] * 4])))
-    assert rain.tolist() == [True, False, False, True, False, False, False]
 
 
 def test_a_scan_without_intensity_has_no_dim_points_and_teaches_nothing() -> None:

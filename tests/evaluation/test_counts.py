@@ -1,19 +1,23 @@
-"""Counts of points and rays, the scores that follow from them, and the tables that they fill."""
+"""Counts of points and rays against scikit-learn and by hand, and the tables that they fill.
+
+That two processes count what one counts is proved by `tests/models/test_processes.py`.
+"""
 
 import math
+import pickle
+from functools import partial
 
 import numpy as np
 import pytest
+import torch
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
+from sklearn import metrics
 
-from derain.evaluation.counts import (
-    SCORES,
-    Counts,
-    intersection_over_union,
-    mean_over_scans,
-    ratio,
-)
+from derain.errors import InputError
+from derain.evaluation.counts import SCORES, ClassCounts, Counts, RainCounts, mean_over_scans
+from derain.evaluation.metrics import RainMetrics
 from derain.evaluation.ray_counts import RayCounts
 from derain.evaluation.text_tables import markdown_table, number_text, plain_table
 from derain.scan import Scan
@@ -21,11 +25,12 @@ from derain.views.returns import pair_returns
 
 from ..two_returns import Recording
 
-points = st.lists(st.tuples(st.booleans(), st.booleans()), max_size=30)
-numbers = st.integers(0, 2**40)
+CLASSES = {0: "ground", 3: "rain", 7: "car", 110: "snow", 255: "nobody knows"}
+RAIN = (3, 110)
+approx = partial(pytest.approx, nan_ok=True)
 
 
-@given(points)
+@given(st.lists(st.tuples(st.booleans(), st.booleans()), max_size=30))
 def test_every_point_is_counted_as_what_it_is(pairs: list[tuple[bool, bool]]) -> None:
     called_rain, rain = np.array(pairs, bool).reshape(-1, 2).T
     outcomes = [(True, True), (True, False), (False, True), (False, False)]
@@ -35,31 +40,113 @@ def test_every_point_is_counted_as_what_it_is(pairs: list[tuple[bool, bool]]) ->
     assert sum(parts, Counts()) == counts
 
 
-@given(st.lists(st.tuples(numbers, numbers), min_size=1, max_size=9))
-def test_many_scores_at_once_are_those_of_each_alone(pairs: list[tuple[int, int]]) -> None:
-    hits, errors = np.array(pairs).T
-    # Python divides integers with correct rounding.
-    expected = [hit / (hit + error) if hit + error else math.nan for hit, error in pairs]
-    for found in (
-        intersection_over_union(hits, errors),
-        ratio(hits, hits + errors),
-        [Counts(hit, 0, error, 0).iou for hit, error in pairs],
-        [Counts(hit, error, 0, 0).iou for hit, error in pairs],
-    ):
-        np.testing.assert_array_equal(found, expected)
-
-
-def test_every_score_is_a_share_and_a_mean_leaves_out_scans_without_it() -> None:
-    counts = Counts(3, 1, 2, 5)
-    scores = [getattr(counts, score) for score in SCORES]
-    assert scores == pytest.approx([3 / 4, 3 / 5, 2 / 3, 3 / 6])
+def test_a_mean_over_scans_leaves_out_scans_without_the_score() -> None:
     scans = [Counts(1, 1, 0, 8), Counts(0, 0, 0, 10), Counts(0, 1, 0, 9), Counts(0, 0, 2, 8)]
     means = [mean_over_scans(scans, score) for score in SCORES]
     assert means == pytest.approx([(1 / 2 + 0) / 2, (1 + 0) / 2, (2 / 3 + 0 + 0) / 3, 0.5 / 3])
     assert math.isnan(mean_over_scans(scans[1:2], "iou"))
 
 
-@pytest.mark.parametrize("seed", range(3))
+def labelled(seed: int, points: int) -> tuple[Scan, NDArray[np.bool_]]:
+    """A scan with points on the edges of bands and points without a return, and an answer."""
+    random = np.random.default_rng(seed)
+    xyz = random.uniform(-90, 90, (points, 3)).astype(np.float32)
+    xyz[random.random(points) < 0.1] = (20, 0, 0)
+    xyz[random.random(points) < 0.05] = np.nan
+    label = random.choice(list(CLASSES), points)
+    return Scan(xyz).with_label(label), np.isin(label, RAIN) ^ (random.random(points) < 0.3)
+
+
+def reference(truth: NDArray[np.bool_], called: NDArray[np.bool_]) -> list[float]:
+    """The four scores as scikit-learn computes them, which takes no empty arrays."""
+    if not len(truth):
+        return [math.nan] * 4
+    functions = (metrics.precision_score, metrics.recall_score, metrics.f1_score)
+    scores = [float(score(truth, called, zero_division=math.nan)) for score in functions]
+    # This one takes no NaN.
+    iou = metrics.jaccard_score(truth, called) if (truth | called).any() else math.nan
+    return [*scores, float(iou)]
+
+
+@pytest.mark.parametrize("points", [(), (0,), (1, 50, 50), (2, 2, 2, 2), (0, 40)])
+def test_scores_are_those_of_scikit_learn_and_all_counts_add_up(points: tuple[int, ...]) -> None:
+    counts = RainCounts(CLASSES, RAIN, unknown=[255])
+    truths, answers = [np.zeros(0, bool)], [np.zeros(0, bool)]
+    for scan, called in (labelled(*one) for one in enumerate(points)):
+        counts.add(scan, called)
+        known = scan.label != 255
+        truths.append(np.isin(scan.label[known], RAIN))
+        answers.append(called[known])
+    groups = [*counts.per_scan, counts.pooled()]
+    pairs = [*zip(truths[1:], answers[1:], strict=True)]
+    pairs.append((np.concatenate(truths), np.concatenate(answers)))
+    for group, pair in zip(groups, pairs, strict=True):
+        assert [getattr(group, score) for score in SCORES] == approx(reference(*pair), rel=1e-12)
+    assert counts.pooled() == sum(counts.per_scan, Counts())
+    assert counts.pooled() == sum(counts.by_range().values(), Counts())
+
+
+def test_points_are_counted_by_class_and_by_the_band_that_begins_at_an_edge() -> None:
+    counts = RainCounts(CLASSES, RAIN, unknown=[255])
+    x = np.array([3, 9.99, 10, 39.9, 80, 1e9, np.inf, np.nan, 1])
+    label = np.array([3, 0, 0, 3, 0, 0, 110, 7, 255])
+    called = np.array([1, 1, 0, 0, 0, 1, 0, 0, 1], bool)
+    counts.add(
+        Scan(np.stack([x, 0 * x, 0 * x], axis=1).astype(np.float32)).with_label(label), called
+    )
+    assert counts.by_range() == {
+        "0-10 m": Counts(1, 1, 0, 0),
+        "10-20 m": Counts(0, 0, 0, 1),
+        "20-40 m": Counts(0, 0, 1, 0),
+        "40-80 m": Counts(),
+        "80+ m": Counts(0, 1, 1, 2),
+    }
+    by_class = counts.by_class()
+    assert by_class == {
+        "ground": ClassCounts(4, 2, rain=False),
+        "rain": ClassCounts(2, 1, rain=True),
+        "car": ClassCounts(1, 0, rain=False),
+        "snow": ClassCounts(1, 0, rain=True),
+    }
+    assert by_class["rain"].share_lost == by_class["rain"].share_wrong == 0.5
+    assert counts.pooled_over([3, 7]) == Counts(1, 0, 1, 1)
+
+
+def test_what_cannot_be_counted_is_refused() -> None:
+    counts = RainCounts({0: "ground", 3: "rain"}, [3])
+    scan = Scan(np.ones((1, 3), np.float32))
+    with pytest.raises(InputError, match="no labels"):
+        counts.add(scan, np.array([True]))
+    with pytest.raises(InputError, match="id 9"):
+        counts.add(scan.with_label(np.array([9])), np.array([True]))
+    assert counts.per_scan == []
+    for classes, rain in (({0: "a", 1: "a"}, [0]), ({0: "a"}, [5])):
+        with pytest.raises(InputError):
+            RainCounts(classes, rain)
+
+
+def test_a_metric_counts_alike_in_any_precision_and_forgets_when_reset() -> None:
+    metric, expected = RainMetrics(CLASSES, RAIN, [255]), RainCounts(CLASSES, RAIN, [255])
+    for number in range(3):
+        scan, called = labelled(number, 60)
+        metric.update(scan, called)
+        expected.add(scan, called)
+        metric = pickle.loads(pickle.dumps(metric)).to(torch.bfloat16)
+    counts = metric.counts()
+    np.testing.assert_array_equal(counts.cells, expected.cells)
+    assert counts.per_scan == expected.per_scan
+    computed = metric.compute()
+    assert {(value.shape, value.dtype) for value in computed.values()} == {((), torch.float32)}
+    for score in SCORES:
+        assert computed[score] == pytest.approx(getattr(expected.pooled(), score))
+        mean = mean_over_scans(expected.per_scan, score)
+        assert computed[f"{score}_per_scan"] == pytest.approx(mean)
+    metric.reset()
+    assert metric.counts().per_scan == []
+    assert metric.counts().pooled() == Counts()
+
+
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("times", [1, 2])
 def test_each_ray_counts_once_however_often_it_is_written(seed: int, times: int) -> None:
     recording = Recording(seed)
@@ -89,8 +176,6 @@ def test_a_return_whose_ray_met_something_that_is_no_row_has_met_no_rain() -> No
     scan = Scan(recording.xyz, fields=returns).take(~nearer)
     counts = RayCounts.of(scan, pair_returns(scan), np.ones(len(scan), bool))
     assert counts == RayCounts(len(scan), int(farther.sum()), len(scan) - int(farther.sum()), 0)
-    nothing = RayCounts(0, 0, 0, 0)
-    assert (nothing.given_back_share, nothing.dual_share) == (0, 0)
 
 
 def test_tables_line_up_and_a_number_that_is_undefined_is_a_dash() -> None:

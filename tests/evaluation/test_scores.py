@@ -1,12 +1,8 @@
 """What methods score: every point once, in every grouping, and a failure is never hidden."""
 
-from dataclasses import replace
-
 import numpy as np
-import pytest
 
 from derain.cards.card import DataCard
-from derain.errors import InputError
 from derain.evaluation.baselines import all_points, no_points
 from derain.evaluation.counts import Counts
 from derain.evaluation.scores import score
@@ -37,15 +33,6 @@ def test_scans_are_gathered_by_their_rain_rate(scans: list[Scan], card: DataCard
     assert score([all_points], scans, card)[0].by_rain_rate == {}
 
 
-def test_points_of_lidar_and_radar_are_counted_apart_where_they_are_known(
-    scans: list[Scan], card: DataCard
-) -> None:
-    assert score([all_points], scans, card)[0].by_sensor == {}
-    of_radar = np.arange(300) >= 290
-    (fused,) = score([all_points], [replace(scan, radar=of_radar) for scan in scans], card)
-    assert fused.by_sensor == {"LiDAR": Counts(60, 790, 0, 0), "radar": Counts(30, 0, 0, 0)}
-
-
 def test_a_method_that_fails_on_a_scan_finds_nothing_there_and_says_why(
     scans: list[Scan], card: DataCard
 ) -> None:
@@ -67,12 +54,3 @@ def test_copies_of_a_point_count_once_where_that_is_asked(
     doubled = [scan.take(np.repeat(np.arange(len(scan)), 2)) for scan in scans]
     assert score([all_points], doubled, card)[0].pooled == Counts(180, 1580, 0, 0)
     assert score([all_points], doubled, card, distinct=True) == score([all_points], scans, card)
-
-
-def test_scans_without_labels_and_labels_without_a_class_are_refused(
-    scans: list[Scan], card: DataCard
-) -> None:
-    with pytest.raises(InputError, match="scan 0: it has no labels"):
-        score([all_points], [replace(scans[0], label=None)], card)
-    with pytest.raises(InputError, match="id 7 is no known class"):
-        score([all_points], [replace(scans[0], label=np.full(300, 7))], card)

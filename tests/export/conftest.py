@@ -23,7 +23,7 @@ class RainySession(Session):
 
     def __init__(self, file: ModelFile, threads: int, precision: str) -> None:
         self.usual = OnnxRuntimeSession(file, threads, "float32")
-        self.asked = (threads, precision)
+        self.settings = (threads, precision)
 
     @property
     def inputs(self) -> dict[str, TensorType]:
@@ -34,7 +34,7 @@ class RainySession(Session):
         return self.usual.outputs
 
     def run(self, inputs: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
-        return self.usual.run(inputs) + np.float32([0, RAINY[self.asked[1]]])
+        return self.usual.run(inputs) + np.float32([0, RAINY[self.settings[1]]])
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""A model that judges candidates says of each what it says without, and nothing else is rain."""
+"""A model judges its candidates as it does without bounds, and nothing else is rain."""
 
 from collections.abc import Callable
 from copy import deepcopy
@@ -41,7 +41,7 @@ def test_its_answer_for_candidates_is_bit_for_bit_that_of_the_model_without(
     of_all, of_candidates = Derainer(onnx_model, 1), Derainer(judging_candidates, 1)
     judged = 0
     for name, scan in [*hard_cases(largest=3000), ("scene", Scan.of(scene(2000)))]:
-        # Rows at one position are given one score, and whether it is a candidate its first says.
+        # Rows at one position have one score; its first row decides whether it is a candidate.
         first = of_all.view(scan)
         among = np.zeros(len(scan), bool)
         among[first.judged] = NEAR_AND_DIM.among(scan)[first.first][first.inverse[first.judged]]
@@ -101,7 +101,7 @@ def test_bounds_of_nothing_are_refused(random_outdet: OutDet, labelled: list[Sca
         fit_network_candidates(random_outdet, dry, WADS)
     blind = deepcopy(random_outdet)
     blind.adopt(replace(blind.spec, threshold=1.0))
-    with pytest.raises(InputError, match=r"--candidates: no bounds tell rain .* leave it out"):
+    with pytest.raises(InputError, match=r"--candidates: no bounds separate .* leave it out"):
         fit_network_candidates(blind, labelled, WADS)
 
 

@@ -16,8 +16,8 @@ from derain.cards.card import load_card
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export import onnx_file
-from derain.export.onnx_file import evaluation_on_cpu, export
-from derain.export.proof import FINITE, FLOAT32, INT8, THREADS, Case, Proof, prove
+from derain.export.onnx_file import export
+from derain.export.proof import FINITE, FLOAT32, INT8, Case, Proof, prove
 from derain.export.runtime import Derainer
 from derain.models.outdet import OutDet
 from derain.scan import Scan
@@ -54,21 +54,6 @@ def test_the_file_holds_a_whole_network_and_how_it_is_used(
     properties = {entry.key: entry.value for entry in proto.metadata_props}
     assert properties["license"] == "network: MIT; training data: CC BY-NC-SA 4.0"
     assert properties["version"] == derain.__version__
-
-
-def test_the_proof_in_the_file_is_that_of_every_hard_case(
-    onnx_model: Path, random_outdet: OutDet
-) -> None:
-    written = Derainer(onnx_model).metadata["proof"]
-    view = random_outdet.spec.make_view()
-    judged = {name: len(view(scan).points) for name, scan in hard_cases()}
-    assert [(case["name"], case["threads"], case["points"]) for case in written["cases"]] == [
-        (name, threads, points) for name, points in judged.items() for threads in THREADS
-    ]
-    assert written["points"] == len(THREADS) * sum(judged.values())
-    assert written["largest_difference"] == max(case["difference"] for case in written["cases"])
-    assert written["flipped"] == sum(case["flipped"] for case in written["cases"])
-    assert 0 < written["largest_difference"] < 1e-5
 
 
 @pytest.mark.parametrize("offset", [1e-3, 0.5])
@@ -189,14 +174,9 @@ def test_an_older_file_stays_as_it_was_when_the_exported_network_is_wrong(
     assert [file.read_bytes() for file in tmp_path.iterdir()] == [b"an older model"]
 
 
-def test_what_cannot_be_exported_leaves_nothing(
-    tmp_path: Path, random_outdet: OutDet, onnx_model: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_cannot_be_exported_leaves_nothing(tmp_path: Path, random_outdet: OutDet) -> None:
     with pytest.raises(InputError, match="outdet: has not been trained"):
         export(OutDet(), tmp_path / "model.onnx")
-    monkeypatch.setattr(onnx_file, "_traced", lambda *_: onnx.load(onnx_model))
-    with pytest.raises(InputError, match="no convolution to quantise"):
-        export(random_outdet, tmp_path / "model.onnx", [Scan.of(scene(99))])
     with pytest.raises(InputError, match="is not a file that can be replaced"):
         export(random_outdet, tmp_path)
     assert list(tmp_path.iterdir()) == []
@@ -226,33 +206,30 @@ def test_numbers_too_small_to_count_are_set_to_0_and_the_proof_holds(
 
 
 @pytest.mark.parametrize("succeeds", [True, False])
-def test_a_model_is_left_in_the_modes_that_it_was_in(
+def test_a_model_is_left_in_its_modes_and_on_its_device(
     random_outdet: OutDet,
     onnx_model: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     succeeds: bool,
 ) -> None:
-    model = deepcopy(random_outdet).train()
+    model, device, moved = deepcopy(random_outdet).train(), torch.device("cuda:0"), []
     frozen = next(module for module in model.modules() if isinstance(module, nn.BatchNorm1d))
     frozen.eval()
+
+    def flushed(proto: onnx.ModelProto) -> int:
+        assert not any(module.training for module in model.modules())
+        assert moved == []
+        return 0 if succeeds else 1 // 0
+
+    monkeypatch.setattr(OutDet, "device", device)  # as if it were there
+    monkeypatch.setattr(model, "to", moved.append)
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: SCENE)
     monkeypatch.setattr(onnx_file, "_traced", lambda *_: onnx.load(onnx_model))
-    if not succeeds:
-        monkeypatch.setattr(onnx_file, "flush_to_zero", lambda proto: 1 / 0)
+    monkeypatch.setattr(onnx_file, "flush_to_zero", flushed)
     with nullcontext() if succeeds else pytest.raises(ZeroDivisionError):
         export(model, tmp_path / "model.onnx")
     assert [module for module in model.modules() if not module.training] == [frozen]
-
-
-def test_a_model_is_taken_back_to_its_device(
-    random_outdet: OutDet, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    device, moved = torch.device("cuda:0"), list[torch.device]()
-    monkeypatch.setattr(OutDet, "device", device)  # as if it were there
-    monkeypatch.setattr(random_outdet, "to", moved.append)
-    with evaluation_on_cpu(random_outdet):
-        assert moved == []
     assert moved == [device]
 
 

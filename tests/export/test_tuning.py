@@ -1,13 +1,9 @@
 """Tuning finds what is there to be found, and goes on where it stopped."""
 
-import itertools
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import optuna
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -17,13 +13,11 @@ from numpy.typing import NDArray
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
-from derain.export import tuning
 from derain.export.storage import Storage
 from derain.export.tuning import (
     LabelledNeighbourhoods,
-    Search,
+    Tuned,
     neighbours_to_find,
-    pooled_iou,
     search_space,
     tune_filter,
     tune_threshold,
@@ -61,10 +55,19 @@ def seen() -> list[LabelledNeighbourhoods]:
     return [neighbourhoods(labelled(seed)) for seed in (1, 2)]
 
 
-def search(trials: int, storage: Path | None = None, data: str = "a") -> tuple[Search, list[int]]:
-    told: list[int] = []
+def tune(
+    name: str,
+    scans: list[LabelledNeighbourhoods],
+    trials: int,
+    storage: Path | None = None,
+    data: str = "a",
+) -> tuple[Tuned, int]:
+    """What tuning finds on scans of such names, and how many trials it computed."""
+    computed: list[int] = []
+    named = {f"{data}{number}": scan for number, scan in enumerate(scans)}
     place = None if storage is None else Storage(str(storage))
-    return Search(trials, 0, place, [data], lambda: told.append(1)), told
+    tuned = tune_filter(name, named, trials, 0, place, lambda: computed.append(1))
+    return tuned, len(computed)
 
 
 @pytest.mark.parametrize("name", FILTERS)
@@ -73,13 +76,12 @@ def test_tuning_starts_from_the_defaults_and_ends_no_worse(
 ) -> None:
     assert search_space(name)
     assert neighbours_to_find(name) == 12
-    how, told = search(4)
-    tuned = tune_filter(name, seen, how)
-    assert len(told) == 4
+    tuned, computed = tune(name, seen, 4)
+    assert computed == 4
     assert tuned.iou == iou_of(filter_from(name, tuned.parameters), 1, 2)
     assert tuned.default_iou == iou_of(filter_from(name, {}), 1, 2)
     assert tuned.iou >= tuned.default_iou
-    first = tune_filter(name, seen, search(1)[0])
+    first, _ = tune(name, seen, 1)
     assert filter_from(name, first.parameters) == filter_from(name, {})
 
 
@@ -111,7 +113,7 @@ def test_as_many_neighbours_are_found_as_any_trial_looks_at(
     add(neighbours=(10, 30), reach=(0.1, 50.0))
     assert neighbours_to_find("near") == 30
     scans = [LabelledNeighbourhoods.of(labelled(1), CARD, 30, threads=1)]
-    tuned = tune_filter("near", scans, search(5)[0])
+    tuned, _ = tune("near", scans, 5)
     assert tuned.iou == iou_of(filter_from("near", tuned.parameters), 1)
 
 
@@ -123,7 +125,7 @@ def test_tuning_finds_the_radius_that_parts_drops_from_a_wall() -> None:
     points = np.concatenate([wall, drops]).astype(np.float32)
     label = np.where(np.arange(len(points)) >= len(wall), 3, 0)
     seen = [neighbourhoods(Scan(points).with_label(label))]
-    tuned = tune_filter("ror", seen, search(60)[0])
+    tuned, _ = tune("ror", seen, 60)
     assert tuned.iou == 1 > tuned.default_iou
     assert 0.1 < tuned.parameters["radius"] < 3
 
@@ -133,65 +135,16 @@ def test_a_stored_study_goes_on_with_the_same_scans_and_labels_alone(
 ) -> None:
     storage = tmp_path / "study.db"
     for trials, run in ((4, 4), (7, 3), (7, 0)):
-        how, told = search(trials, storage)
-        tuned = tune_filter("dsor", seen, how)
-        assert len(told) == run
-    assert tuned == tune_filter("dsor", seen, search(7)[0])
+        tuned, computed = tune("dsor", seen, trials, storage)
+        assert computed == run
+    assert tuned == tune("dsor", seen, 7)[0]
     other = DataCard("made up", {0: "solid", 3: "rain", 9: "also rain"}, rain=(3, 9))
     relabelled = [neighbourhoods(labelled(seed), other) for seed in (1, 2)]
     for scans, data in ((seen, "b"), (relabelled, "a")):
         with pytest.raises(InputError, match="holds a study of dsor on other scans, labels or"):
-            tune_filter("dsor", scans, search(9, storage, data)[0])
+            tune("dsor", scans, 9, storage, data)
     # Another filter has a study of its own in the same file.
-    assert tune_filter("ror", seen, search(1, storage, data="b")[0]).iou > 0
-
-
-def trials_in(storage: Path) -> list[tuple[dict[str, float], float]]:
-    """Parameters and values of the complete trials of DSOR's study."""
-    study = optuna.load_study(study_name="dsor", storage=f"sqlite:///{storage}")
-    complete = study.get_trials(states=[optuna.trial.TrialState.COMPLETE])
-    return [(trial.params, trial.value) for trial in complete]
-
-
-def test_a_search_broken_off_in_the_midst_of_a_trial_ends_as_an_unbroken_one(
-    seen: list[LabelledNeighbourhoods], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    unbroken = tune_filter("dsor", seen, search(12, tmp_path / "unbroken.db")[0])
-    storage, weighed = tmp_path / "broken.db", itertools.count()
-
-    def broken_off(*arguments: Any) -> float:
-        if next(weighed) == 11:  # more than are drawn at random
-            raise KeyboardInterrupt
-        return pooled_iou(*arguments)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(tuning, "pooled_iou", broken_off)
-        with pytest.raises(KeyboardInterrupt):
-            tune_filter("dsor", seen, search(12, storage)[0])
-    assert len(trials_in(storage)) == 11
-    # A trial that no search of ours entered is nobody's.
-    optuna.load_study(study_name="dsor", storage=f"sqlite:///{storage}").ask()
-    assert tune_filter("dsor", seen, search(12, storage)[0]) == unbroken
-
-
-def test_trials_of_another_seed_count(seen: list[LabelledNeighbourhoods], tmp_path: Path) -> None:
-    storage = tmp_path / "study.db"
-    best = tune_filter("dsor", seen, replace(search(5, storage)[0], seed=7))
-    how, told = search(5, storage)
-    assert tune_filter("dsor", seen, how) == best
-    assert told == []
-    assert tune_filter("dsor", seen, search(7, storage)[0]).iou >= best.iou
-    assert len(trials_in(storage)) == 7
-
-
-@pytest.mark.parametrize("make", [Path.mkdir, lambda path: path.write_text("no database" * 99)])
-def test_a_storage_that_cannot_be_used_is_refused(
-    make: Callable[[Path], object], seen: list[LabelledNeighbourhoods], tmp_path: Path
-) -> None:
-    storage = tmp_path / "study.db"
-    make(storage)
-    with pytest.raises(InputError, match="cannot be used as storage"):
-        tune_filter("dsor", seen, search(1, storage)[0])
+    assert tune("ror", seen, 1, storage, data="b")[0].iou > 0
 
 
 # Two of them are neighbours: nothing lies midway.

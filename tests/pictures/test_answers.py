@@ -39,7 +39,7 @@ def test_the_bars_of_a_teacher_are_its_shares_by_scan(scan: Scan) -> None:
     figure = teacher_figure(scans, "a teacher")
     assert heights(figure, 0, RAIN) == pytest.approx([0.25, 0.0])
     assert heights(figure, 0, NOT_KNOWN) == pytest.approx([0.125, 0.0])
-    assert any(text.get_text() == "held out" for text in figure.axes[0].texts)
+    assert any(text.get_text() == " held out" for text in figure.axes[0].texts)
     assert not any(text.get_text() for text in teacher_figure(scans[:1], "").axes[0].texts)
 
 

@@ -14,7 +14,7 @@ from matplotlib.image import imread
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
-from derain.pictures.palette import OUTCOMES
+from derain.pictures.palette import OUTCOMES, PROBABILITY, rgb, shades
 from derain.pictures.scan_pictures import (
     MOST_PANELS_IN_A_ROW,
     before_after_figure,
@@ -200,3 +200,14 @@ def test_without_a_screen_a_window_is_refused(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     with pytest.raises(InputError, match="there is no screen to open it on"):
         show_comparison(Scan.of(scene(10)), {"none": np.zeros(10, bool)}, None)
+
+
+def test_shades_lie_between_their_colours_and_the_more_probable_is_brighter() -> None:
+    share = np.array([-1.0, 0.0, 0.25, 0.5, 1.0, 2.0])
+    first, middle, last = (np.array(rgb(colour)) for colour in PROBABILITY)
+    between = np.round((first + middle) / 2)
+    expected = np.array([first, first, between, middle, last, last])
+    np.testing.assert_array_equal(shades(PROBABILITY, share), expected)
+    # Source: luma of ITU-R BT.601.
+    luma = shades(PROBABILITY, np.linspace(0, 1, 101)) @ np.array([0.299, 0.587, 0.114])
+    assert (np.diff(luma) > 0).all()

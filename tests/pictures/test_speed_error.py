@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
-from matplotlib.path import Path
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
@@ -77,19 +76,9 @@ def test_labels_cover_neither_each_other_nor_a_marker(seed: int) -> None:
         assert text.arrow_patch or np.argmin(np.hypot(*beyond.T)) == number
 
 
-def test_no_error_at_all_is_drawn_at_the_least() -> None:
-    figure = speed_error_figure([Standing("perfect", 0.0, 3.0, "network")], "one method")
-    (collection,) = figure.axes[0].collections
-    np.testing.assert_allclose(collection.get_offsets(), [[3.0, LEAST_ERROR]])
-
-
 def test_sizes_of_files_are_written_short_beside_the_titles() -> None:
     texts = {0: "1 kB", 1_499: "1 kB", 999_499: "999 kB", 999_500: "1.0 MB", 6_849_378: "6.8 MB"}
     assert {size: readable_size(size) for size in texts} == texts
+    perfect = Standing("perfect", 0.0, 3.0, "network")
+    assert perfect.place == (3.0, LEAST_ERROR)
     assert Standing("outdet", 0.1, 60.0, "network", 67_535).label == "outdet · 68 kB"
-
-
-def test_labels_leave_the_front_in_sight_where_there_is_room_beside_it() -> None:
-    methods = [Standing("fast", 0.9, 5, "baseline"), Standing("slow, good", 0.1, 90, "network")]
-    _, places, boxes = drawn(methods)
-    assert not any(Path(places).intersects_bbox(box, filled=False) for box in boxes)

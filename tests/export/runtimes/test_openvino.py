@@ -64,15 +64,6 @@ def test_bfloat16_is_near_on_every_hard_case() -> None:
     assert str(found).startswith("openvino bf16: ")
 
 
-def test_scans_of_any_size_follow_each_other(model: Derainer, model_in_bfloat16: Derainer) -> None:
-    sizes = [500, 0, 1, 2, 499, 1000, 500, 3, 0, 500]
-    for derainer in (model, model_in_bfloat16):
-        answers = [derainer.probability(scene(size)) for size in sizes]
-        for size, answer in zip(sizes, answers, strict=True):
-            alone = Derainer(derainer.path, 2, "openvino", derainer.runtime.precision)
-            np.testing.assert_array_equal(alone.probability(scene(size)), answer)
-
-
 def test_one_model_serves_several_threads_of_a_program(model: Derainer) -> None:
     views = [model.view(Scan.of(scene(2000, seed))) for seed in range(8)]
     expected = [model.logits(view) for view in views]

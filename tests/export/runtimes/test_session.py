@@ -16,12 +16,12 @@ import derain
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
-from derain.export.machine import versions
 from derain.export.methods import load_method
 from derain.export.model_file import ModelFile
 from derain.export.runtime import Derainer
 from derain.export.runtimes.onnx_runtime import WRONG_FUSION
 from derain.export.runtimes.session import RUNTIMES, Runtime, Session, TensorType
+from derain.export.timing import versions
 from derain.models.checkpoint import load_model
 from derain.scan import Scan
 
@@ -64,7 +64,7 @@ def test_what_no_runtime_has_is_refused_with_what_there_is(
 def test_a_runtime_of_another_package_is_given_threads_and_precision(rainy: type[Session]) -> None:
     derainer = Derainer(KEPT, 2, "rainy", "int2")
     assert isinstance(derainer.session, rainy)
-    assert derainer.session.asked == (2, "int2")
+    assert derainer.session.settings == (2, "int2")
     assert derainer(scene(300)).all()
     loaded = load_method(str(KEPT), {}, 1, Runtime("rainy", "bf16"))
     assert isinstance(loaded, Derainer)

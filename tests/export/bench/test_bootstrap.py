@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from derain.evaluation import bootstrap as module
-from derain.evaluation.bootstrap import bootstrap
+from derain.export.bench import rows as module
+from derain.export.bench.rows import bootstrap
 
 
 def test_intervals_agree_with_drawing_scans_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
