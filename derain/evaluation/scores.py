@@ -29,6 +29,7 @@ class Scores:
         by_range: Each band of range, by names such as ``0-10 m``.
         by_rain_rate: Scans of one rain rate, by names such as ``25 mm/h``; empty where none is
             known.
+        by_sensor: Points of the LiDAR and of the radar; empty where they are not distinguished.
         failures: Errors, by the scan's name. In such a scan, no point counts as called rain.
     """
 
@@ -37,6 +38,7 @@ class Scores:
     by_class: Mapping[str, ClassCounts]
     by_range: Mapping[str, Counts]
     by_rain_rate: Mapping[str, Counts]
+    by_sensor: Mapping[str, Counts]
     failures: Mapping[str, str]
 
 
@@ -91,8 +93,10 @@ class Scoring:
     """
 
     def __init__(self, card: DataCard) -> None:
+        self.card = card
         self.counts = RainCounts(card.classes, card.rain, unknown=card.unknown)
         self.by_rain_rate: defaultdict[float, Counts] = defaultdict(Counts)
+        self.by_sensor: defaultdict[str, Counts] = defaultdict(Counts)
         self.failures: dict[str, str] = {}
 
     def judge(
@@ -108,6 +112,11 @@ class Scoring:
         self.counts.add(scan, predicted)
         if rate is not None:
             self.by_rain_rate[rate] += self.counts.per_scan[-1]
+        if scan.radar is not None:
+            rain, known = self.card.rain_of(scan), ~self.card.unknown_of(scan)
+            for sensor, points in {"LiDAR": ~scan.radar, "radar": scan.radar}.items():
+                rows = known & points
+                self.by_sensor[sensor] += Counts.of(predicted[rows], rain[rows])
 
     def add(self, later: "Scoring") -> None:
         """Adds the counts of later scans, which may come from another process."""
@@ -115,6 +124,8 @@ class Scoring:
         self.counts.per_scan += later.counts.per_scan
         for rate, counts in later.by_rain_rate.items():
             self.by_rain_rate[rate] += counts
+        for sensor, counts in later.by_sensor.items():
+            self.by_sensor[sensor] += counts
         self.failures |= later.failures
 
     def scores(self) -> Scores:
@@ -125,5 +136,6 @@ class Scoring:
             self.counts.by_class(),
             self.counts.by_range(),
             {f"{rate:g} mm/h": self.by_rain_rate[rate] for rate in sorted(self.by_rain_rate)},
+            self.by_sensor,
             self.failures,
         )

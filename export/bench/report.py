@@ -76,7 +76,7 @@ def as_csv(rows: Sequence[Row]) -> str:
 
 
 def as_markdown(rows: Sequence[Row], facts: Mapping[str, Any]) -> str:
-    """Tables of the whole, of classes, ranges, rain rates and stages."""
+    """Tables of the whole, of classes, ranges, rain rates, sensors and stages."""
     points = sum(vars(rows[0].scores.pooled).values())
     parts = [
         f"# {facts['title']}, {points:,} points",
@@ -93,6 +93,8 @@ def as_markdown(rows: Sequence[Row], facts: Mapping[str, Any]) -> str:
     ]
     if rows[0].scores.by_rain_rate:
         parts += ["## IoU by rain rate", _groups(rows, lambda row: row.scores.by_rain_rate)]
+    if rows[0].scores.by_sensor:
+        parts += ["## IoU by sensor", _groups(rows, lambda row: row.scores.by_sensor)]
     parts += ["## Milliseconds by stage, median and 95th percentile", _by_stage(rows)]
     if changed := facts.get("runtimes"):
         parts += ["## What another runtime changes", runtimes_table(changed), OTHER_RUNTIMES]

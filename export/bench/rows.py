@@ -83,6 +83,7 @@ class Row:
             "by_class": {name: asdict(c) for name, c in scores.by_class.items() if c.points},
             "by_range": _all_scores(scores.by_range),
             "by_rain_rate": _all_scores(scores.by_rain_rate),
+            "by_sensor": _all_scores(scores.by_sensor),
             "failed_scans": dict(scores.failures),
             "not_timed": self.cost.failure,
             **({} if self.cost.alone else {"timed_alone": False}),

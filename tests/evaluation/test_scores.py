@@ -1,5 +1,7 @@
 """What methods score: every point once, in every grouping, and a failure is never hidden."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from derain.cards.card import DataCard
@@ -31,6 +33,15 @@ def test_scans_are_gathered_by_their_rain_rate(scans: list[Scan], card: DataCard
     (partly,) = score([all_points], scans, card, rain_rates=[None, 25.0, None])
     assert list(partly.by_rain_rate) == ["25 mm/h"]
     assert score([all_points], scans, card)[0].by_rain_rate == {}
+
+
+def test_points_of_lidar_and_radar_are_counted_apart_where_they_are_known(
+    scans: list[Scan], card: DataCard
+) -> None:
+    assert score([all_points], scans, card)[0].by_sensor == {}
+    of_radar = np.arange(300) >= 290
+    (fused,) = score([all_points], [replace(scan, radar=of_radar) for scan in scans], card)
+    assert fused.by_sensor == {"LiDAR": Counts(60, 790, 0, 0), "radar": Counts(30, 0, 0, 0)}
 
 
 def test_a_method_that_fails_on_a_scan_finds_nothing_there_and_says_why(

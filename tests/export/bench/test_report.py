@@ -98,6 +98,7 @@ def test_the_tables_name_every_method_what_failed_and_what_was_not_timed_alone(
     assert "broken: 3 of 3 scans, first" in text
     assert "broken could not be timed: no room" in text
     assert "of their own: all." in text
+    assert "IoU by sensor" not in parts
     # A score that is undefined is a dash: the first finds nothing in the farthest band.
     (main,) = [line for line in text.splitlines() if line.startswith("| broken (!) |")]
     assert [cell.strip() for cell in main.split("|")[2:6]] == ["-", "0.000", "0.000", "0.000"]
