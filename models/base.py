@@ -20,8 +20,7 @@ from derain.learning.start import Start
 from derain.learning.task import Task, TrainingData, agree_on_task
 from derain.models.callbacks.finite_loss import FiniteLoss
 from derain.models.callbacks.resumption import Resumption
-from derain.models.hyperparameters import log_hyperparameters
-from derain.models.measured import MeasuredModule
+from derain.models.measured import MeasuredModule, log_hyperparameters
 from derain.scan import Scan
 from derain.spec import Spec
 from derain.views.candidates import Candidates

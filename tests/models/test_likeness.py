@@ -9,7 +9,7 @@ import torch
 
 from derain.errors import InputError
 from derain.files.documents import Entry
-from derain.models.likeness import matching_state
+from derain.models.callbacks.resumption import matching_state
 
 
 def taken(found: Any, own: Any) -> Any:

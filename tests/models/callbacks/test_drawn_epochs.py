@@ -6,7 +6,7 @@ import lightning
 import pytest
 from lightning.pytorch.trainer.states import TrainerFn
 
-from derain.models.callbacks.drawn_epochs import DrawnEpochs
+from derain.models.callbacks.panels import DrawnEpochs
 
 MakeTrainer = Callable[..., lightning.Trainer]
 

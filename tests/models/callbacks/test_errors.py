@@ -15,9 +15,8 @@ from tensorboard.util import tensor_util
 from derain.datamodules.in_memory import InMemory
 from derain.evaluation.hard_cases import scene
 from derain.evaluation.operating_points import CURVE_THRESHOLDS
-from derain.models.callbacks import errors
-from derain.models.callbacks.dashboard import CHARTS, Dashboard
-from derain.models.callbacks.errors import ErrorPanels
+from derain.models.callbacks import panels
+from derain.models.callbacks.panels import CHARTS, Dashboard, ErrorPanels
 from derain.models.outdet import OutDet
 from derain.scan import Scan
 
@@ -40,7 +39,7 @@ def data() -> InMemory:
 @pytest.fixture(autouse=True)
 def _drawn_in_no_time(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("errors_figure", "operating_points_figure"):
-        monkeypatch.setattr(errors, name, lambda *_: Figure(figsize=(0.1, 0.1)))
+        monkeypatch.setattr(panels, name, lambda *_: Figure(figsize=(0.1, 0.1)))
 
 
 @pytest.fixture

@@ -11,8 +11,7 @@ import torch
 from lightning.pytorch.plugins.io import TorchCheckpointIO
 
 from derain.errors import InputError
-from derain.models.callbacks.whole_checkpoints import WholeCheckpoints, save_whole
-from derain.models.checkpoint import load_model, save_model
+from derain.models.checkpoint import WholeCheckpoints, load_model, save_model, save_whole
 from derain.models.outdet import OutDet
 
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from torch import Tensor
 
-from derain.models.cues.brightness import LARGEST, calibrated
+from derain.models.cues.network import LARGEST_LOG_ODDS, calibrated
 from derain.views.intensity_rank import INTENSITY_RANKS
 from derain.views.isolated_points import SHELLS
 
@@ -45,7 +45,7 @@ def test_log_odds_are_those_of_smoothed_counts(seed: int) -> None:
     usual = 100 * both / both.sum(1, keepdims=True)
     in_rain = (rain + usual) / (rain.sum(1, keepdims=True) + 100)
     in_rest = (rest + usual) / (rest.sum(1, keepdims=True) + 100)
-    expected = np.log(in_rain / in_rest).clip(-LARGEST, LARGEST)
+    expected = np.log(in_rain / in_rest).clip(-LARGEST_LOG_ODDS, LARGEST_LOG_ODDS)
     found = calibrated(counts, cell, probability)
     log_odds = found.log_odds.reshape(SHELLS, INTENSITY_RANKS).numpy()
     occurring = both > 0.1

@@ -18,7 +18,7 @@ from derain.export.runtime import Derainer
 from derain.learning.batch import Batch, Sample
 from derain.models.checkpoint import load_model, save_model
 from derain.models.cues import CueFusion
-from derain.models.cues.beams import in_steps
+from derain.models.cues.geometry import in_steps
 from derain.models.outdet import OutDet
 from derain.scan import Scan
 

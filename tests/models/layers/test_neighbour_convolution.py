@@ -4,15 +4,15 @@ import pytest
 import torch
 from torch import Tensor
 
-from derain.models.layers import neighbour_convolution
-from derain.models.layers.neighbour_convolution import convolve
+from derain.models.outdet import network
+from derain.models.outdet.network import convolve
 
 INPUTS, OUTPUTS, K, POINTS = 3, 4, 5, 11
 
 
 @pytest.fixture(autouse=True)
 def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(neighbour_convolution, "BLOCK", 4)  # 11 points: two blocks and a part
+    monkeypatch.setattr(network, "POINT_BLOCK", 4)  # 11 points: two blocks and a part
 
 
 def case(rows: int = POINTS) -> tuple[Tensor, Tensor, Tensor]:

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from torch import Tensor
 
-from derain.models.lisnownet.haar import haar, inverse_haar
+from derain.models.lisnownet.network import haar, inverse_haar
 
 
 @st.composite

@@ -9,7 +9,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from torch import Tensor
 
-from derain.models.lisnownet.hole_filling import fill_holes
+from derain.models.lisnownet.network import fill_holes
 
 
 def scene(height: int, width: int, share: float, seed: int = 0) -> tuple[Tensor, Tensor]:

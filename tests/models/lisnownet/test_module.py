@@ -23,9 +23,8 @@ from derain.learning.batch import Batch, Sample
 from derain.learning.task import agree_on_task
 from derain.models.checkpoint import load_model, save_model
 from derain.models.lisnownet import LiSnowNet
-from derain.models.lisnownet.deployed import cube_roots, rain_logits
 from derain.models.lisnownet.network import LiSnowNetwork, published_key
-from derain.models.lisnownet.selection_rule import FEWEST, SelectionRule
+from derain.models.lisnownet.selection_rule import FEWEST, SelectionRule, cube_roots, rain_logits
 from derain.models.lisnownet.sparsity import sparsity_loss
 from derain.models.measured import MONITOR
 from derain.scan import Scan
@@ -397,26 +396,12 @@ class Fitted(NamedTuple):
 
     folder: Path
     run: Run
-    runs_of_the_network: int  # besides training
 
 
 @pytest.fixture(scope="module")
 def fitted(train: Callable[..., Run], tmp_path_factory: pytest.TempPathFactory) -> Fitted:
     folder = write_scenes(tmp_path_factory.mktemp("fitted"), validated=3000)
-    return Fitted(folder, *counted(lambda: train(folder, UNSTATED, SEED)))
-
-
-def counted(fit: Callable[[], Run]) -> tuple[Run, int]:
-    """A training, and how often the network ran besides its steps."""
-    forward, training = LiSnowNetwork.forward, list[bool]()
-
-    def recorded(network: LiSnowNetwork, *seen: Tensor) -> Tensor:
-        training.append(network.training)
-        return forward(network, *seen)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(LiSnowNetwork, "forward", recorded)
-        return fit(), training.count(False)
+    return Fitted(folder, train(folder, UNSTATED, SEED))
 
 
 def best_of(fitted: Fitted) -> tuple[LiSnowNet, RangeImage]:
@@ -458,22 +443,6 @@ def test_the_scores_of_an_epoch_are_those_of_its_checkpoint(fitted: Fitted) -> N
     assert run.progress.iou[run.best["epoch"]] == pytest.approx(iou)
 
 
-def test_the_network_runs_once_on_a_validation_scan_that_the_rule_is_fitted_to(
-    train: Callable[..., Run], fitted: Fitted, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    once = fitted.run
-    assert fitted.runs_of_the_network == 5  # four epochs, and the sanity check before them
-    write_scenes(tmp_path, validated=3000)
-    # As where batches hold other images than the rule is fitted to.
-    monkeypatch.setattr(torch, "equal", lambda *_: False)
-    again, runs = counted(lambda: train(tmp_path, UNSTATED, SEED))
-    monkeypatch.undo()
-    assert runs == 9
-    assert once.progress.loss == again.progress.loss
-    assert once.progress.iou == again.progress.iou
-    assert_same(once.model.state_dict(), again.model.state_dict())
-
-
 def test_measuring_a_model_leaves_its_rule_as_it_is(
     fitted: Fitted, make_trainer: MakeTrainer, tmp_path: Path
 ) -> None:
@@ -511,7 +480,7 @@ def test_a_training_that_broke_off_leaves_nothing_to_the_next(
     with pytest.raises(ArithmeticError):
         make_trainer(epochs=1, callbacks=[Breaking()]).fit(model, first)
     seen: list[str] = []
-    look = model._seen
-    model._seen = lambda scan: seen.append(Path(scan.name).name) or look(scan)
+    look = model._image_of
+    model._image_of = lambda scan: seen.append(Path(scan.name).name) or look(scan)
     make_trainer(epochs=2).fit(model, second)
     assert seen == ["1.bin"]

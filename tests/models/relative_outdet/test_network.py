@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from torch import Tensor
 
 from derain.models.relative_outdet import RelativeOutDetNetwork
-from derain.models.relative_outdet.network import OF_CARRIER, without_carrier
-from derain.models.relative_outdet.steps import USUAL_RANGE
+from derain.models.relative_outdet.network import OF_CARRIER, USUAL_RANGE, without_carrier
 from derain.views.neighbour_search import NeighbourSearch
 
 from .beams import sphere

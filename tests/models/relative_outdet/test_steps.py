@@ -5,7 +5,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from derain.models.relative_outdet.steps import in_steps
+from derain.models.relative_outdet.network import in_steps
 from derain.views.neighbour_search import NeighbourSearch
 
 from .beams import sphere
