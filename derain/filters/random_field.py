@@ -29,7 +29,7 @@ def decide_sequentially(
 
     All that may be rain is taken for it first. Then what must turn is turned, wave by wave. A turn
     bears on later points alone, and makes none of them rain; so the waves end where a loop over
-    the points in their order would. Most points are decided once, whatever their neighbours are.
+    the points in their order would.
 
     Args:
         feature: Feature of all points, float64 (M,), from -1 to 1.
@@ -49,53 +49,25 @@ def decide_sequentially(
     others = np.ascontiguousarray(neighbours.take(uncertain, axis=0)[:, 1:].T)
     apart = np.array(distances.take(uncertain, axis=0)[:, 1:].T, np.float64, order="C")
     weights = 1 / (DISTANCE_FLOOR + apart)
-    is_earlier = _by_point(len(feature), rows, place)[others] < place
-    feature_votes = np.where(rain, vote, np.where(feature < RULED_OUT, -vote, feature))[others]
-    at_most = np.where(is_earlier, vote, feature_votes) * weights
-    at_least = np.where(is_earlier, -vote, feature_votes) * weights
+    place_of_all = np.full(len(feature), np.iinfo(np.int64).max)
+    place_of_all[rows] = place
+    is_earlier = place_of_all[others] < place
+    votes_by_feature = np.where(rain, vote, np.where(feature < RULED_OUT, -vote, feature))[others]
+    at_most = np.where(is_earlier, vote, votes_by_feature) * weights
+    at_least = np.where(is_earlier, -vote, votes_by_feature) * weights
     own = feature[rows]
-    is_rain = _total(own, at_most) > 0
-    open_ = np.flatnonzero(is_rain & (_total(own, at_least) <= 0))
-    number = _by_point(len(feature), rows, np.arange(len(rows)))[others[:, open_]]
-    dependents = _Dependents(number, is_earlier[:, open_], len(rows))
-    _turn_in_waves(is_rain, open_, own[open_], at_most[:, open_], at_least[:, open_], dependents)
-    rain[rows] = is_rain
+    rain[rows] = _total(own, at_most) > 0
+    # Most points are decided by now, whatever their neighbours are; only the others may turn.
+    open_ = np.flatnonzero(rain[rows] & (_total(own, at_least) <= 0))
+    rows, own, others, is_earlier = rows[open_], own[open_], others[:, open_], is_earlier[:, open_]
+    at_most, at_least = at_most[:, open_], at_least[:, open_]
+    turns = True
+    while turns:
+        votes = np.where(is_earlier & ~rain[others], at_least, at_most)
+        stays_rain = _total(own, votes) > 0
+        turns = bool((stays_rain != rain[rows]).any())
+        rain[rows] = stays_rain
     return rain
-
-
-def _turn_in_waves(
-    is_rain: NDArray[np.bool_],
-    open_: NDArray[np.int64],
-    own: NDArray[np.float64],
-    votes: NDArray[np.float64],
-    at_least: NDArray[np.float64],
-    dependents: "_Dependents",
-) -> None:
-    """Turns what is taken for rain and is none, until nothing turns any more.
-
-    Args:
-        is_rain: What the U uncertain points are taken for, bool (U,); decided in place.
-        open_: Numbers of the H points whose verdicts are open, int64 (H,).
-        own: Their features, float64 (H,).
-        votes: The votes for them while all before them are rain, float64 (k - 1, H); changed in
-            place.
-        at_least: The votes for them where none before them is, float64 (k - 1, H).
-        dependents: Which of them hear of whose decision.
-    """
-    turned = np.flatnonzero(~is_rain)
-    while len(turned):
-        column, dependent = dependents.of(turned)
-        votes[column, dependent] = at_least[column, dependent]
-        asked = np.unique(dependent[is_rain[open_[dependent]]])
-        turned = open_[asked[_total(own[asked], votes[:, asked]) <= 0]]
-        is_rain[turned] = False
-
-
-def _by_point(points: int, rows: NDArray[np.int64], values: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Values of some points by their rows, and what is beyond them all for others, int64 (M,)."""
-    by_point = np.full(points, np.iinfo(np.int64).max)
-    by_point[rows] = values
-    return by_point
 
 
 def _total(own: NDArray[np.float64], votes: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -112,38 +84,3 @@ def _total(own: NDArray[np.float64], votes: NDArray[np.float64]) -> NDArray[np.f
     for vote in votes:
         total += vote
     return total
-
-
-class _Dependents:
-    """Who hears of the decision on each of U uncertain points.
-
-    Args:
-        neighbours: Numbers of the neighbours of each of H hearers, int64 (k - 1, H).
-        is_earlier: Which of these are uncertain and judged before it, bool (k - 1, H).
-        uncertain: U.
-    """
-
-    def __init__(
-        self, neighbours: NDArray[np.int64], is_earlier: NDArray[np.bool_], uncertain: int
-    ) -> None:
-        of = neighbours[is_earlier]
-        order = np.argsort(of, kind="stable")
-        self._column, self._dependent = (place[order] for place in np.nonzero(is_earlier))
-        count = np.bincount(of, minlength=uncertain)
-        self._end = np.cumsum(count)
-        self._start = self._end - count
-
-    def of(self, points: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Who hears of the decisions on some points, and as which of its neighbours.
-
-        Args:
-            points: Numbers of the points, int64 (P,).
-
-        Returns:
-            Columns and hearers of every such pair, int64 each.
-        """
-        start, end = self._start[points], self._end[points]
-        count = end - start
-        before = np.cumsum(count) - count
-        listed = np.repeat(start - before, count) + np.arange(count.sum())
-        return self._column[listed], self._dependent[listed]

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from derain.cards.card import DataCard
-from derain.datamodules.statistics import with_statistics
+from derain.datamodules.base import with_statistics
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases
 from derain.scan import Scan
