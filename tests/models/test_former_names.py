@@ -25,12 +25,6 @@ def test_a_checkpoint_of_an_earlier_version_is_read_with_current_names(tmp_path:
     }
 
 
-def test_what_is_no_state_of_callbacks_is_left_as_it_is(tmp_path: Path) -> None:
-    strange = {"callbacks": [1], "hyper_parameters": 3}
-    torch.save(strange, tmp_path / "strange.ckpt")
-    assert read_checkpoint(tmp_path / "strange.ckpt") == strange
-
-
 def test_a_monitor_of_an_earlier_configuration_is_followed(tmp_path: Path) -> None:
     callback = BestCheckpoint(tmp_path, monitor="val/merit", mode="max")
     trainer = lightning.Trainer(accelerator="cpu", logger=False, enable_checkpointing=False)

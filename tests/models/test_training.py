@@ -90,11 +90,6 @@ def run(make_trainer: MakeTrainer, tmp_path_factory: pytest.TempPathFactory) -> 
     return Run(model, data, losses.values, scores, probabilities)
 
 
-def test_the_loss_falls(run: Run) -> None:
-    assert len(run.losses) == 15
-    assert run.losses[-1] < 0.5 * run.losses[0]
-
-
 def test_a_trained_network_beats_rules_that_need_no_network(run: Run) -> None:
     rule = IntensityRule.best(truths(run.data, "train"))
     ((scan, rain),) = truths(run.data, "test")
@@ -110,17 +105,6 @@ def test_the_scores_of_a_test_are_those_of_its_predictions(run: Run) -> None:
     by_class = run.model.metrics.counts().by_class()
     assert by_class["rain"].called_rain == (predicted & rain).sum()
     assert sum(counts.points for counts in by_class.values()) == len(rain)
-
-
-def test_the_model_learns_spec_and_class_weights_from_its_data(run: Run) -> None:
-    card, spec = run.data.card, run.model.spec
-    assert card.has_statistics
-    assert (spec.mean, spec.std, spec.rain) == (card.mean, card.std, card.rain)
-    assert (spec.data, spec.units[3]) == ("simulated rain", "0..255")
-    torch.testing.assert_close(run.model.mean, torch.tensor(card.mean))
-    assert torch.equal(
-        run.model.class_weight, class_weights([1 - card.rain_share, card.rain_share])
-    )
 
 
 @pytest.fixture
@@ -340,24 +324,6 @@ def test_an_untrained_model_is_not_tested(
 ) -> None:
     with pytest.raises(InputError, match="has not been trained"):
         make_trainer(epochs=1).test(OutDet(), scenes())
-
-
-def test_a_run_goes_through_scans_of_no_point_and_of_one(
-    make_trainer: MakeTrainer, scenes: Callable[..., Folder], tmp_path: Path
-) -> None:
-    for points in (0, 1):
-        scene(300)[:points].tofile(tmp_path / f"tiny{points}.bin")
-        write_labels(tmp_path / f"tiny{points}.label", np.full(points, RAIN))
-    data = scenes(train="tiny*.bin")
-    data.patterns["validation"] = data.patterns["test"] = ["*.bin"]
-    model, trainer = OutDet(), make_trainer(epochs=2)
-    trainer.fit(model, data)
-    assert trainer.global_step == 4
-    assert all(tensor.isfinite().all() for tensor in model.state_dict().values())
-    trainer.test(model, data, verbose=False)
-    measured = model.metrics.counts()
-    assert len(measured.per_scan) == 6
-    assert sum(counts.points for counts in measured.by_class().values()) == 4 * 300 + 1
 
 
 def test_accumulated_batches_make_one_step_on_the_mean_of_their_gradients(

@@ -5,13 +5,12 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-import lightning
 import pytest
 import torch
 from lightning.pytorch.plugins.io import TorchCheckpointIO
 
 from derain.errors import InputError
-from derain.models.checkpoint import WholeCheckpoints, load_model, save_model, save_whole
+from derain.models.checkpoint import WholeCheckpoints, load_model, save_model
 from derain.models.outdet import OutDet
 
 
@@ -59,18 +58,6 @@ def test_an_address_is_left_to_lightning() -> None:
     checkpoints = WholeCheckpoints()
     checkpoints.save_checkpoint({"epoch": 3}, "memory://runs/model.ckpt")
     assert checkpoints.load_checkpoint("memory://runs/model.ckpt") == {"epoch": 3}
-
-
-class Own(TorchCheckpointIO):
-    """A way of writing checkpoints that somebody has chosen."""
-
-
-@pytest.mark.parametrize(("plugins", "expected"), [([], WholeCheckpoints), ([Own()], Own)])
-def test_only_lightnings_own_way_of_writing_is_replaced(
-    plugins: list[TorchCheckpointIO], expected: type
-) -> None:
-    trainer = lightning.Trainer(accelerator="cpu", logger=False, plugins=plugins)
-    assert type(save_whole(trainer).strategy.checkpoint_io) is expected
 
 
 def test_a_checkpoint_holds_what_lightning_would_write(tmp_path: Path) -> None:

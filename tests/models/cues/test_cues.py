@@ -1,7 +1,6 @@
 """Cues: what the network makes of a scan's brightness, in whatever unit, order and direction."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import lightning
 import numpy as np
@@ -16,7 +15,6 @@ from derain.evaluation.hard_cases import scene
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.learning.batch import Batch, Sample
-from derain.models.checkpoint import load_model, save_model
 from derain.models.cues import CueFusion
 from derain.models.cues.geometry import in_steps
 from derain.models.outdet import OutDet
@@ -88,15 +86,6 @@ def test_scans_of_a_batch_say_nothing_to_each_other(trained: CueFusion) -> None:
     together = trained.logits_of(Batch.of(samples))
     apart = torch.cat([trained.logits_of(Batch.of([sample])) for sample in samples])
     torch.testing.assert_close(together, apart)
-
-
-def test_a_checkpoint_gives_the_same(trained: CueFusion, tmp_path: Path) -> None:
-    save_model(trained, tmp_path / "model.ckpt")
-    again = load_model(tmp_path / "model.ckpt")
-    assert again.spec == trained.spec
-    assert isinstance(again, CueFusion)
-    for own, other in zip(trained.state_dict().values(), again.state_dict().values(), strict=True):
-        torch.testing.assert_close(own, other, rtol=0, atol=0)
 
 
 def test_it_needs_its_neighbours_and_a_start_of_its_kind() -> None:

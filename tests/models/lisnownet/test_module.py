@@ -20,7 +20,6 @@ from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
 from derain.learning.batch import Batch, Sample
-from derain.learning.task import agree_on_task
 from derain.models.checkpoint import load_model, save_model
 from derain.models.lisnownet import LiSnowNet
 from derain.models.lisnownet.network import LiSnowNetwork, published_key
@@ -77,16 +76,6 @@ def test_the_rule_travels_in_the_checkpoint(image_network: MakeModel, tmp_path: 
     assert copy.spec == model.spec
     assert copy.selection == model.selection
     assert (copy.selection.residual, copy.selection.near) == (0.5, 3.0)
-
-
-def test_a_checkpoint_whose_rule_lacks_a_constant_is_refused(
-    image_network: MakeModel, tmp_path: Path
-) -> None:
-    model = image_network(LiSnowNet)
-    del model.hparams["spec"]["rule"]["near"]
-    save_model(model, tmp_path / "model.ckpt")
-    with pytest.raises(InputError, match=r"model\.ckpt: .*checkpoint: rule: near is missing"):
-        load_model(tmp_path / "model.ckpt")
 
 
 @pytest.mark.parametrize(
@@ -451,15 +440,6 @@ def test_measuring_a_model_leaves_its_rule_as_it_is(
     data = Folder(str(tmp_path), "wads", validation=["9.bin"])
     make_trainer(epochs=1).validate(model, data, verbose=False)
     assert model.spec == spec
-
-
-def test_statistics_are_measured_without_labels(small_grid: dict[str, Any], tmp_path: Path) -> None:
-    model = LiSnowNet(small_grid, width=2)
-    agree_on_task(model, scenes_of(without_labels(write_scenes(tmp_path)), "simulated"))
-    points = np.concatenate([scene(300, seed=number) for number in range(3)]).astype(np.float64)
-    distance = np.linalg.norm(points[:, :3], axis=1)
-    np.testing.assert_allclose(model.spec.mean, (distance.mean(), *points[:, 2:].mean(axis=0)))
-    np.testing.assert_allclose(model.spec.std, (distance.std(), *points[:, 2:].std(axis=0)))
 
 
 def test_a_training_that_broke_off_leaves_nothing_to_the_next(

@@ -176,14 +176,6 @@ def test_an_image_without_variation_leaves_the_others_their_gradient() -> None:
     torch.testing.assert_close(gradients[2], gradients[0], rtol=1e-4, atol=1e-5)
 
 
-def test_one_pixel_at_the_smallest_size_can_be_trained_on() -> None:
-    network, (image, valid) = small().train(), scene(16, 16)
-    denoised = network(image, valid)
-    sparsity_loss(denoised, image, valid, alpha=5, beta=0.5).total.backward()
-    assert denoised.isfinite().all()
-    assert all(parameter.grad.isfinite().all() for parameter in network.parameters())
-
-
 def test_the_gradient_reaches_every_parameter() -> None:
     network, (image, valid) = small(), scene(64, 64, scans=2)
     sparsity_loss(network(image, valid), image, valid, alpha=5, beta=0.5).total.backward()

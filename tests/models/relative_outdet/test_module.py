@@ -18,7 +18,6 @@ from derain.export.candidates import fit_network_candidates
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.learning.batch import Batch, Sample
-from derain.models.checkpoint import load_model, save_model
 from derain.models.relative_outdet import RelativeOutDet
 from derain.scan import Scan
 from derain.views.candidates import Bound, Candidates
@@ -80,13 +79,6 @@ def test_it_takes_no_candidates(trained: RelativeOutDet) -> None:
         RelativeOutDet().adopt(replace(trained.spec, candidates=candidates))
     with pytest.raises(InputError, match="--candidates: relative_outdet judges every point alike"):
         fit_network_candidates(trained, [labelled(3)], load_card("wads"))
-
-
-def test_a_checkpoint_gives_the_same(trained: RelativeOutDet, tmp_path: Path) -> None:
-    save_model(trained, tmp_path / "model.ckpt")
-    again = load_model(tmp_path / "model.ckpt")
-    for name, tensor in trained.state_dict().items():
-        torch.testing.assert_close(again.state_dict()[name], tensor)
 
 
 def test_too_small_a_neighbourhood_is_refused() -> None:

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 
 from derain.errors import InputError
-from derain.models.salsanext.network import PUBLISHED_KEYS, PixelBatchNorm, SalsaNextNetwork
+from derain.models.salsanext.network import PUBLISHED_KEYS, SalsaNextNetwork
 
 from ..oracle_weights import recipe_weights
 
@@ -89,25 +89,6 @@ def test_weights_of_another_network_are_refused(
 def test_a_width_that_cannot_be_halved_is_refused(width: int) -> None:
     with pytest.raises(InputError, match=f"width: {width} is not"):
         SalsaNextNetwork(width=width)
-
-
-def test_a_single_pixel_is_normalised_by_the_running_statistics() -> None:
-    norm, features = PixelBatchNorm(3), image(1, 1, channels=3)
-    norm.running_mean.copy_(torch.tensor([1.0, -2.0, 0.5]))
-    norm.running_var.copy_(torch.tensor([4.0, 0.25, 1.0]))
-    kept = {name: buffer.clone() for name, buffer in norm.named_buffers()}
-    normalised = norm.train()(features)
-    torch.testing.assert_close(normalised, norm.eval()(features))
-    for name, buffer in norm.named_buffers():
-        torch.testing.assert_close(buffer, kept[name], rtol=0, atol=0)
-
-
-@pytest.mark.parametrize("shape", [(2, 3, 1, 1), (1, 3, 1, 2), (2, 3, 4, 5)])
-def test_more_pixels_are_normalised_as_by_pytorch(shape: tuple[int, ...]) -> None:
-    norm, reference, features = PixelBatchNorm(3), nn.BatchNorm2d(3), torch.randn(shape)
-    torch.testing.assert_close(norm(features), reference(features))
-    for buffer, expected in zip(norm.buffers(), reference.buffers(), strict=True):
-        torch.testing.assert_close(buffer, expected)
 
 
 @pytest.mark.filterwarnings("ignore")  # the exporter's own parts warn of each other

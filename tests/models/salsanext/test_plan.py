@@ -52,16 +52,6 @@ def test_an_image_of_any_size_counts_as_continued_by_empty_pixels(
 
 
 @both
-@pytest.mark.parametrize("training", [False, True], ids=["evaluation", "training"])
-@pytest.mark.parametrize("value", [0.0, 1.0, -1.0, 1e4])
-def test_a_constant_image_gives_finite_logits(
-    kind: type[SalsaNextPlan], value: float, training: bool
-) -> None:
-    network = small(kind).train(training)
-    assert network(torch.full((1, 5, 32, 32), value)).isfinite().all()
-
-
-@both
 @pytest.mark.parametrize(
     ("scans", "height", "width"), [(1, 1, 1), (1, 16, 16), (2, 16, 16), (1, 20, 37)]
 )
