@@ -93,20 +93,6 @@ def test_the_model_normalises_what_the_network_sees(outdet: MakeModel, sample: M
     np.testing.assert_allclose(logits.detach(), expected, atol=2e-4)
 
 
-def test_training_drops_half_of_the_features_and_doubles_the_rest(
-    outdet: MakeModel, sample: MakeSample
-) -> None:
-    network, inputs = outdet().network.train(), inputs_of(sample(scene(400)))
-    network.head = torch.nn.Identity()
-    torch.manual_seed(0)
-    dropped = network(**inputs)
-    network.dropout.p = 0.0
-    whole = network(**inputs)
-    kept = dropped != 0
-    assert kept.float().mean() == pytest.approx(0.5, abs=0.03)
-    torch.testing.assert_close(dropped[kept], 2 * whole[kept])
-
-
 @torch.no_grad()
 def test_candidates_are_scored_as_they_are_among_all(outdet: MakeModel, sample: MakeSample) -> None:
     model = outdet(seed=6)

@@ -203,20 +203,6 @@ def test_callbacks_go_without_a_data_module(
     assert "WADS, 2 scans" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("workers", [0, 1])
-def test_what_a_worker_cannot_read_stops_a_plain_loader_with_its_name(
-    make_trainer: MakeTrainer, files: Folder, workers: int
-) -> None:
-    model = OutDet()
-    task = agree_on_task(model, files)
-    (files.root / "1.bin").write_bytes(b"damaged")
-    damaged = files.source("train")[1:2]  # a worker that is left in the middle takes seconds to end
-    loader = scan_loader(damaged, "train", task, Loading(workers=workers))
-    with pytest.raises(InputError, match=r"1\.bin: 7 bytes are not whole rows") as refusal:
-        make_trainer(epochs=1).fit(model, loader)
-    assert "Traceback" not in str(refusal.value)
-
-
 def test_a_run_of_loaders_goes_on_from_its_checkpoint(
     make_trainer: MakeTrainer, memory: InMemory, tmp_path: Path
 ) -> None:
