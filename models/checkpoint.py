@@ -88,7 +88,7 @@ def started(model: DerainingModule, checkpoint: Path, name: str) -> DerainingMod
     """A model of the same kind that begins where another one has ended.
 
     Network, channels, view and normalisation are those of the checkpoint; how it is trained, and
-    its threshold and candidates, are as the model says (its ``RECIPE``).
+    its threshold and candidates, are the model's (its ``RECIPE``).
 
     Example:
         >>> recipe = OutDet(neighbours=5, learning_rate=0.002)
@@ -192,7 +192,7 @@ def refuse_not_finite(weights: Mapping[str, Tensor], path: Path) -> None:
 
 
 def save_whole(trainer: lightning.Trainer) -> lightning.Trainer:
-    """Has a trainer write its checkpoints whole, unless it was told how to write them.
+    """Has a trainer write its checkpoints whole, unless it was given another way to write them.
 
     Returns:
         The same trainer.

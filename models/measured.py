@@ -93,7 +93,7 @@ class MeasuredModule(lightning.LightningModule, ABC):
 
     @abstractmethod
     def losses(self, batch: Batch) -> tuple[dict[str, Tensor], Tensor]:
-        """What the network is to make small, and what it says.
+        """The losses that training lowers, and the logits.
 
         Returns:
             ``loss`` and what it is made of, each a scalar, by name; and the logits of "not rain"

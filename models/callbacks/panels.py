@@ -47,7 +47,7 @@ CHARTS = {
 class DrawnEpochs:
     """Chooses some of the epochs that end in a validation, spread from the first to the last.
 
-    Where nobody says how many epochs there are, each chosen one comes after twice as many
+    Where the number of epochs is not known, each chosen one comes after twice as many
     validations as the one before it. Of an epoch with several validations, the first is drawn.
 
     Args:
@@ -84,7 +84,7 @@ class ScanPanels(lightning.Callback):
     Of several processes the first draws, of the scans that it measures.
 
     A picture costs as much as a step of training and more, and of each scan TensorBoard shows ten
-    pictures. So ten of the epochs are drawn, chosen as :class:`DrawnEpochs` says.
+    pictures. So ten of the epochs are drawn, chosen by :class:`DrawnEpochs`.
 
     Args:
         scans: How many scans to show; 0 shows none.

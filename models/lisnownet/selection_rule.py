@@ -142,8 +142,8 @@ def rain_logits(
 ) -> Tensor:
     """Logits of "not rain" and "rain" of every pixel, float (B · H · W, 2), row by row.
 
-    The published rule says yes or no. Here its answer is that of a probability of one half, which
-    the residual moves. A pixel without a return is not rain.
+    The published rule decides yes or no. Here its limit is a probability of one half, from which
+    the residual moves it. A pixel without a return is not rain.
 
     Args:
         image: Range (m), z (m) and intensity (the data's unit), float (B, 3, H, W).

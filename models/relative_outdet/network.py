@@ -55,8 +55,8 @@ class RelativeOutDetNetwork(nn.Module):
     """The network, from points of one scan to logits.
 
     As 3D-OutDet it looks at each point's neighbours, and then at what it made of theirs. Between
-    the two it is told what the scan holds at the range of the point: an isolated return is likelier
-    a drop where there are many.
+    the two it receives what the scan holds at the range of the point: an isolated return is more
+    likely a drop where there are many.
 
     Example:
         >>> network = RelativeOutDetNetwork(neighbours=4).eval()
@@ -70,7 +70,7 @@ class RelativeOutDetNetwork(nn.Module):
         width: Features of a point.
         of_neighbour: Features of each neighbour, of where it is.
         opinion: What a point tells those that it is a neighbour of.
-        context: Features of a shell; 0 tells a point nothing of the rest of its scan.
+        context: Features of a shell; 0 leaves the rest of the scan out.
     """
 
     centres: Tensor
@@ -98,7 +98,7 @@ class RelativeOutDetNetwork(nn.Module):
     def forward(self, points: Tensor, distances: Tensor, neighbours: Tensor) -> Tensor:
         """Scores every point of a scan.
 
-        There are no candidates: what is said of a point depends on the whole scan.
+        There are no candidates: the score of a point depends on the whole scan.
 
         Args:
             points: x, y, z in metres, in the sensor's frame, float (M, 3).
