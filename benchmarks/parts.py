@@ -21,7 +21,7 @@ from derain.export.runtime import Derainer
 from derain.export.timing import versions
 from derain.files import read_scan
 from derain.models.checkpoint import load_model
-from derain.models.outdet import deployed
+from derain.models.outdet import network
 from derain.views.morton import distinct_positions
 
 NEIGHBOURS = 9
@@ -43,7 +43,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         networks = {}
         for blocks in (1, 16):
-            deployed.BLOCKS = blocks
+            network.BLOCKS = blocks
             model = Path(folder) / f"{blocks}.onnx"
             export(load_model(arguments.checkpoint), model)
             networks[f"in {blocks} blocks"] = _network(Derainer(model, arguments.threads), scan)

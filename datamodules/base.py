@@ -1,15 +1,16 @@
 """From a source of frames to batches of views."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import lightning
+import numpy as np
+from numpy.typing import NDArray
 from torch.utils.data import DataLoader
 
-from derain.cards.card import DataCard
+from derain.cards.card import CHANNELS_OF_STATISTICS, DataCard
 from derain.datamodules.loader import scan_loader
 from derain.datamodules.order import Draws
 from derain.datamodules.scan_data import Loading, Part, ScanData, with_needed_labels
-from derain.datamodules.statistics import with_statistics
 from derain.errors import InputError
 from derain.learning.batch import Sample
 from derain.learning.task import Task
@@ -18,11 +19,15 @@ from derain.sources.reader import FrameReader
 from derain.sources.source import Source
 from derain.sources.spread import evenly_spaced
 from derain.sources.training_record import record_of_scans
+from derain.views.channels import USUAL_CHANNELS, channel_values
 
 __all__ = ["Loading", "Part", "ScanDataModule"]
 
 # Training scans that statistics are measured on.
 MOST_MEASURED = 200
+
+# A variance below this share of the squared mean is what rounding leaves of a constant.
+ROUNDING = 1e-12
 
 
 class ScanDataModule(ScanData, lightning.LightningDataModule):
@@ -129,3 +134,56 @@ class ScanDataModule(ScanData, lightning.LightningDataModule):
     def _reader(self) -> FrameReader:
         columns = None if self.task is None else self.task.columns
         return FrameReader(self.card, self.loading.intensity_scale, columns)
+
+
+def with_statistics(card: DataCard, scans: Iterable[Scan], extra: Sequence[str] = ()) -> DataCard:
+    """Completes a data card with the statistics that it lacks.
+
+    Mean and standard deviation of x, y, z and range in metres, of intensity and of extra channels,
+    over the valid points of all scans; 0 and 1 for a channel without values. The share of rain is
+    that among the points of known class; it is not measured where a scan has no labels.
+
+    Args:
+        card: A data card.
+        scans: Training scans.
+        extra: Names of further channels.
+
+    Raises:
+        InputError: An extra channel without any value.
+    """
+    channels = (*USUAL_CHANNELS, *extra)
+    count, total, squares = np.zeros((3, len(channels)))
+    rain, judged, labelled = 0, 0, True
+    for scan in scans:
+        rows = np.flatnonzero(scan.valid)
+        values = channel_values(scan, rows, channels).astype(np.float64)
+        count += (~np.isnan(values)).sum(axis=1)
+        total += np.nansum(values, axis=1)
+        squares += np.nansum(values**2, axis=1)
+        labelled = labelled and scan.label is not None
+        if labelled:
+            rain += int(card.rain_of(scan)[rows].sum())
+            judged += int((~card.unknown_of(scan)[rows]).sum())
+    _refuse_missing(extra, count[len(USUAL_CHANNELS) :])
+    mean = total / np.maximum(count, 1)
+    variance = squares / np.maximum(count, 1) - mean**2
+    # A constant channel is not divided by 0.
+    std = np.sqrt(np.where(variance > ROUNDING * mean**2, variance, 1.0))
+    statistics = dict(zip(channels, zip(mean.tolist(), std.tolist(), strict=True), strict=True))
+    return card.completed(
+        mean=tuple(statistics[name][0] for name in CHANNELS_OF_STATISTICS),
+        std=tuple(statistics[name][1] for name in CHANNELS_OF_STATISTICS),
+        range=statistics["range"],
+        extra={name: statistics[name] for name in extra},
+        rain_share=rain / max(judged, 1) if labelled else None,
+    )
+
+
+def _refuse_missing(channels: Sequence[str], count: NDArray[np.float64]) -> None:
+    for name, known in zip(channels, count, strict=True):
+        if not known:
+            raise InputError(
+                f"channel '{name}'",
+                "no training scan holds a number of that name",
+                "Name columns of the scans, with data.loading.columns where files do not.",
+            )

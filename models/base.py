@@ -20,8 +20,7 @@ from derain.learning.start import Start
 from derain.learning.task import Task, TrainingData, agree_on_task
 from derain.models.callbacks.finite_loss import FiniteLoss
 from derain.models.callbacks.resumption import Resumption
-from derain.models.hyperparameters import log_hyperparameters
-from derain.models.measured import MeasuredModule
+from derain.models.measured import MeasuredModule, log_hyperparameters
 from derain.scan import Scan
 from derain.spec import Spec
 from derain.views.candidates import Candidates
@@ -44,7 +43,7 @@ class DerainingModule(MeasuredModule):
         NAME: Name of the network in a Spec and on the command line; the decorator sets it.
         VIEW: Kind of the view that it sees a scan through.
         LOGIT_GAIN: How many times more than other networks' its logits amplify rounding.
-        RECIPE: Names of the arguments that say how it is trained and what is called rain. One that
+        RECIPE: Names of the arguments of its training and of what is called rain. One that
             starts from another model keeps its own, and has the other's in place of all the rest.
         INTEGER_OPERATORS: What computes in eight bits in a model that is exported so; ONNX names.
         channels: Names of its input channels, as :meth:`Scan.channel` takes them.
@@ -95,7 +94,7 @@ class DerainingModule(MeasuredModule):
 
     @property
     def has_spec(self) -> bool:
-        """Whether a training or a checkpoint has said how the network is used."""
+        """Whether it has a Spec, from a training or a checkpoint."""
         return self._spec is not None
 
     @property
@@ -103,7 +102,7 @@ class DerainingModule(MeasuredModule):
         """How the network is used.
 
         Raises:
-            InputError: Neither data nor a checkpoint has said so yet.
+            InputError: It has none yet, from data or from a checkpoint.
         """
         if self._spec is None:
             raise InputError(self.NAME, "has not been trained", "Give a checkpoint: --ckpt_path.")
@@ -142,7 +141,7 @@ class DerainingModule(MeasuredModule):
         return None
 
     def adopt_rule(self, rule: Entry) -> None:
-        """Takes over the constants of the network's own rule, as its Spec says them.
+        """Takes over the constants of the network's own rule from its Spec.
 
         Args:
             rule: What stands under ``rule`` in the Spec. It is not trusted.

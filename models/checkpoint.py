@@ -1,20 +1,26 @@
-"""Checkpoints on disk: written whole, and read without trust."""
+"""Checkpoints on disk: written whole, read without trust, and begun from."""
 
+import io
 import logging
 import re
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
+from hashlib import sha256
 from inspect import signature
 from pathlib import Path
 from typing import Any
 
 import lightning
+import torch
+from lightning.pytorch.plugins.io import TorchCheckpointIO
+from torch import Tensor
 
 from derain.errors import InputError, did_you_mean
+from derain.files.atomic import replacing
 from derain.files.documents import Entry, shown
+from derain.files.reading import reading
+from derain.learning.start import Start
 from derain.models.base import DerainingModule
-from derain.models.callbacks.whole_checkpoints import refuse_not_finite, save_whole
-from derain.models.likeness import LARGEST_COUNT, REMEDY, matching_state
+from derain.models.callbacks.resumption import LARGEST_COUNT, REMEDY, matching_state
 from derain.models.limits import check_hyperparameters
 from derain.models.published import LOAD_ERRORS, read_checkpoint, with_tensors
 from derain.models.registry import NETWORKS
@@ -26,6 +32,9 @@ TRAINING_STATE = {"optimizer_states", "lr_schedulers", "loops", "callbacks"}
 # Versions from 2.0 on: Lightning rewrites the checkpoints of those before, and none is derain's.
 # Source: PEP 440.
 LIGHTNING_VERSION = re.compile(r"([2-9]|[1-9]\d+)(\.\d+)+((a|b|rc|\.post|\.?dev)\d+)?(\+[\w.]+)?")
+
+# Digits of a checksum that tell one checkpoint from others.
+CHECKSUM_DIGITS = 12
 
 
 def load_model(path: Path | str) -> DerainingModule:
@@ -73,6 +82,124 @@ def network_of_checkpoint(path: Path) -> tuple[type[DerainingModule], dict[str, 
 def class_path(network: type[DerainingModule]) -> str:
     """The name by which a configuration finds the class of a network."""
     return f"{network.__module__}.{network.__qualname__}"
+
+
+def started(model: DerainingModule, checkpoint: Path, name: str) -> DerainingModule:
+    """A model of the same kind that begins where another one has ended.
+
+    Network, channels, view and normalisation are those of the checkpoint; how it is trained, and
+    its threshold and candidates, are the model's (its ``RECIPE``).
+
+    Example:
+        >>> recipe = OutDet(neighbours=5, learning_rate=0.002)
+        >>> student = started(recipe, Path("model.ckpt"), "mine")
+        >>> student.hparams["neighbours"], student.hparams["learning_rate"]
+        (9, 0.002)
+
+    Args:
+        model: A model that has not been trained.
+        checkpoint: A checkpoint that derain wrote.
+        name: What the Spec calls it.
+
+    Raises:
+        InputError: A checkpoint that cannot be read, or one of another network.
+    """
+    source = load_model(checkpoint)
+    arguments = {
+        argument: (
+            model if argument in model.RECIPE or argument not in source.hparams else source
+        ).hparams[argument]
+        for argument in model.hparams
+        if argument != "spec" and not argument.startswith("_")
+    }
+    student = type(model)(**arguments)
+    try:
+        student.begin_from(source)
+    except InputError as error:
+        raise InputError(checkpoint, error.reason, error.remedy) from error
+    # By what Lightning's command line has entered there, it reads a checkpoint back.
+    student.hparams.update({key: own for key, own in model.hparams.items() if key[0] == "_"})
+    with reading(checkpoint):
+        checksum = sha256(checkpoint.read_bytes()).hexdigest()[:CHECKSUM_DIGITS]
+    student.start = Start(f"{name} ({checksum})", source.spec)
+    return student
+
+
+def save_model(model: DerainingModule, path: Path) -> None:
+    """Writes weights and Spec as a training run would, for all that uses or measures a model.
+
+    No training goes on from it, for it holds no state of one.
+
+    Raises:
+        InputError: An output that cannot be written.
+    """
+    # Lightning's own command line would find the class by this name; derain's does not ask it.
+    model.hparams["_class_path"] = class_path(type(model))
+    trainer = _idle_trainer()
+    trainer.strategy.connect(model)
+    save_whole(trainer).save_checkpoint(path, weights_only=True)
+
+
+class WholeCheckpoints(TorchCheckpointIO):
+    """Writes checkpoints as Lightning does, but beside their place, and then into it.
+
+    Lightning writes to the system's folder of temporary files. Between file systems the move from
+    there is a copy, which a full disk or a kill cuts short under the checkpoint's own name, when
+    the one before it is lost already.
+    """
+
+    def save_checkpoint(
+        self, checkpoint: dict[str, Any], path: str | Path, storage_options: Any | None = None
+    ) -> None:
+        """Writes a checkpoint; one that is there is replaced at the end.
+
+        Raises:
+            InputError: It cannot be written, or its weights are not finite; what was there stays.
+        """
+        refuse_not_finite(checkpoint.get("state_dict", {}), Path(path))
+        if "://" in str(path) or storage_options is not None:  # not a file of this system's
+            super().save_checkpoint(checkpoint, path, storage_options)
+            return
+        content = io.BytesIO()  # torch hides what goes wrong where it writes itself
+        torch.save(checkpoint, content)
+        with replacing(Path(path)) as temporary:
+            temporary.write_bytes(content.getbuffer())
+
+    def load_checkpoint(self, path: str | Path, *arguments: Any, **options: Any) -> dict[str, Any]:
+        """Reads a checkpoint onto the CPU. It is not trusted: only plain values are unpickled.
+
+        Raises:
+            InputError: A missing file, or one that holds anything else.
+        """
+        if "://" in str(path):
+            return super().load_checkpoint(path, *arguments, **options)
+        return read_checkpoint(Path(path))
+
+
+def refuse_not_finite(weights: Mapping[str, Tensor], path: Path) -> None:
+    """Refuses weights that no training can mend and that judge no scan.
+
+    Raises:
+        InputError: Some weights are NaN or infinite.
+    """
+    for name, tensor in weights.items():
+        if not tensor.isfinite().all():
+            raise InputError(
+                path,
+                f"the weights {name} are not finite",
+                "Train again with a lower learning rate.",
+            )
+
+
+def save_whole(trainer: lightning.Trainer) -> lightning.Trainer:
+    """Has a trainer write its checkpoints whole, unless it was given another way to write them.
+
+    Returns:
+        The same trainer.
+    """
+    if type(trainer.strategy.checkpoint_io) is TorchCheckpointIO:
+        trainer.strategy.checkpoint_io = WholeCheckpoints()
+    return trainer
 
 
 def _model_of(content: Mapping[str, Any], path: Path) -> DerainingModule:
@@ -155,35 +282,14 @@ def _fresh_loops() -> dict[str, dict[str, Any]]:
     return {name: getattr(trainer, name).state_dict() for name in names}
 
 
-def save_model(model: DerainingModule, path: Path) -> None:
-    """Writes weights and Spec as a training run would, for all that uses or measures a model.
-
-    No training goes on from it, for it holds no state of one.
-
-    Raises:
-        InputError: An output that cannot be written.
-    """
-    # Lightning's own command line would find the class by this name; derain's does not ask it.
-    model.hparams["_class_path"] = class_path(type(model))
-    trainer = _idle_trainer()
-    trainer.strategy.connect(model)
-    save_whole(trainer).save_checkpoint(path, weights_only=True)
-
-
 def _idle_trainer() -> lightning.Trainer:
-    with _quiet():
-        return lightning.Trainer(
-            accelerator="cpu", logger=False, enable_checkpointing=False, enable_model_summary=False
-        )
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Keeps the trainer from telling of its hardware: it does nothing but write."""
+    """A trainer that prints nothing of its hardware, for it does nothing but write."""
     logger = logging.getLogger("lightning.pytorch.utilities.rank_zero")
     level = logger.level
     logger.setLevel(logging.ERROR)
     try:
-        yield
+        return lightning.Trainer(
+            accelerator="cpu", logger=False, enable_checkpointing=False, enable_model_summary=False
+        )
     finally:
         logger.setLevel(level)

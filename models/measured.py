@@ -1,16 +1,18 @@
-"""What every derainer says of scans, counted and logged: validation, test and prediction."""
+"""How every derainer is measured and logged: in validation, test and prediction."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import astuple
 from typing import Any, ClassVar
 
 import lightning
 import numpy as np
 import torch
+from lightning.pytorch.loggers import TensorBoardLogger
 from lightning.pytorch.trainer.states import TrainerFn
 from numpy.typing import NDArray
 from torch import Tensor
+from torch.utils.tensorboard.summary import hparams
 
 from derain.cards.card import DataCard
 from derain.evaluation.counts import SCORES, Counts
@@ -28,6 +30,9 @@ from derain.views.probability import probability_of_rain
 # validation scans where a network learns from labels and there is rain in them, else minus the
 # loss. Logs, checkpoints and configurations have it under this name.
 MONITOR = "val/score"
+
+# By what the table ranks runs: the IoU of the latest validation, and the scores of the test.
+COLUMNS = ("hp_metric", *(f"test/{score}" for score in reversed(SCORES)), "test/average_precision")
 
 
 class MeasuredModule(lightning.LightningModule, ABC):
@@ -88,7 +93,7 @@ class MeasuredModule(lightning.LightningModule, ABC):
 
     @abstractmethod
     def losses(self, batch: Batch) -> tuple[dict[str, Tensor], Tensor]:
-        """What the network is to make small, and what it says.
+        """The losses that training lowers, and the logits.
 
         Returns:
             ``loss`` and what it is made of, each a scalar, by name; and the logits of "not rain"
@@ -197,3 +202,31 @@ class MeasuredModule(lightning.LightningModule, ABC):
     def _log_identical(self, values: Mapping[str, Tensor], **options: Any) -> None:
         """Logs what all processes have computed alike; the largest of equal numbers is exact."""
         self.log_dict(values, sync_dist=True, reduce_fx="max", **options)
+
+
+def log_hyperparameters(loggers: Iterable[object], parameters: Mapping[str, Any]) -> None:
+    """Enters a run. What is not logged yet stays blank in the table, a test above all.
+
+    Args:
+        loggers: The run's; those of TensorBoard are written to.
+        parameters: What is to stand in the table. The Spec, which is as long as a page, and names
+            that begin with an underscore are left out.
+    """
+    shown = {
+        name: value if isinstance(value, bool | int | float | str) else _as_text(value)
+        for name, value in parameters.items()
+        if name != "spec" and not name.startswith("_")
+    }
+    for logger in loggers:
+        # TensorBoard takes the columns of all runs from one of them, so that each must name those
+        # of the test, too. Lightning would log a score of 0 for each column, which nobody measured.
+        writer: Any = logger.experiment.file_writer if isinstance(logger, TensorBoardLogger) else 0
+        if hasattr(writer, "add_summary"):  # as of the first process
+            for summary in hparams(shown, dict.fromkeys(COLUMNS, 0.0)):
+                writer.add_summary(summary)
+
+
+def _as_text(value: Any) -> str:
+    if isinstance(value, tuple | list):
+        return ", ".join(map(str, value))
+    return str(value)

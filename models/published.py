@@ -130,7 +130,7 @@ def published_tensors(
 
 
 def with_tensors(make: Callable[[], Network], tensors: Mapping[str, Tensor]) -> Network:
-    """A network with tensors from a file that is not trusted, which also says how large it is.
+    """A network with tensors from a file that is not trusted, which also states its size.
 
     Args:
         make: Makes the network.

@@ -29,7 +29,7 @@ class SupervisedModule(DerainingModule):
 
     def __init__(self, channels: Sequence[str]) -> None:
         super().__init__(channels)
-        # Not in the state_dict: the data say it.
+        # Not in the state_dict: it comes from the data.
         self.register_buffer("class_weight", torch.ones(2), persistent=False)
 
     def setup(self, stage: str) -> None:
@@ -54,7 +54,7 @@ class SupervisedModule(DerainingModule):
         """Takes over what was agreed with the data, and weighs the classes by their shares there.
 
         Of a network that judges candidates alone, they are the shares among them. How far the rarer
-        class counts for more is what ``balance`` says.
+        class counts for more is set by ``balance``.
 
         Raises:
             InputError: A Spec of another network.

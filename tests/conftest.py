@@ -154,7 +154,7 @@ def onnx_model(random_outdet: "OutDet", made_once: Callable[..., Path]) -> Path:
     from derain.export.onnx_file import export
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("derain.models.outdet.deployed.BLOCKS", 2)
+        patch.setattr("derain.models.outdet.network.BLOCKS", 2)
         return made_once("outdet.onnx", partial(export, random_outdet))
 
 
@@ -253,7 +253,7 @@ def salsanext_onnx(random_salsanext: "SalsaNextModule", made_once: Callable[...,
 @pytest.fixture
 def one_block(monkeypatch: pytest.MonkeyPatch) -> None:
     """Exports 3D-OutDet in one block: the same network, traced several times as quickly."""
-    monkeypatch.setattr("derain.models.outdet.deployed.BLOCKS", 1)
+    monkeypatch.setattr("derain.models.outdet.network.BLOCKS", 1)
 
 
 @pytest.fixture

@@ -190,7 +190,7 @@ def _fit(model: Any, folder: Path, epochs: int, ckpt_path: Path | None = None) -
 
     from derain.datamodules.in_memory import InMemory
     from derain.models.callbacks.best_checkpoint import BestCheckpoint
-    from derain.models.callbacks.whole_checkpoints import save_whole
+    from derain.models.checkpoint import save_whole
     from derain.models.measured import MONITOR
 
     scan = Scan.of(scene(POINTS)).with_label(np.resize([0, 110], POINTS))

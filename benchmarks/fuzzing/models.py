@@ -39,10 +39,10 @@ def write_models(folder: Path) -> None:
     from derain.cards.card import load_card
     from derain.export.onnx_file import export
     from derain.models.checkpoint import save_model
-    from derain.models.outdet import OutDet, deployed
+    from derain.models.outdet import OutDet, network
     from derain.models.salsanext import SalsaNext
 
-    deployed.BLOCKS = 1  # the same network, traced several times as quickly
+    network.BLOCKS = 1  # the same network, traced several times as quickly
     torch.manual_seed(0)
     for model in (OutDet(), SalsaNext(grid=GRID, width=4)):
         model.adopt(model.spec_for(load_card("wads")))

@@ -34,18 +34,21 @@ from derain.errors import InputError, reason_of
 from derain.files.documents import Entry
 from derain.models.base import DerainingModule
 from derain.models.callbacks.best_checkpoint import BestCheckpoint
-from derain.models.callbacks.dashboard import Dashboard
-from derain.models.callbacks.errors import ErrorPanels
-from derain.models.callbacks.panels import ScanPanels
+from derain.models.callbacks.panels import Dashboard, ErrorPanels, ScanPanels
 from derain.models.callbacks.prediction import PredictionWriter
 from derain.models.callbacks.report import TestReport
 from derain.models.callbacks.step_times import StepTimes
-from derain.models.callbacks.whole_checkpoints import save_whole
-from derain.models.checkpoint import check_resumable, class_path, load_model, network_of_checkpoint
+from derain.models.checkpoint import (
+    check_resumable,
+    class_path,
+    load_model,
+    network_of_checkpoint,
+    save_whole,
+    started,
+)
 from derain.models.limits import check_hyperparameters
 from derain.models.measured import MONITOR
 from derain.models.registry import NETWORKS
-from derain.models.start import started
 from derain.system.cores import usable_cores
 from derain.system.memory import KEPT_IN_TRAINING, keep_freed_memory
 from derain.system.open3d_import import warn_where_tensorboard_cannot_start

@@ -66,7 +66,7 @@ class PredictionWriter(BasePredictionWriter):
             self.written += 1
 
     def on_predict_end(self, trainer: lightning.Trainer, model: DerainingModule) -> None:
-        """Says what was written, by all processes together."""
+        """Prints how many files all processes have written."""
         of_this = torch.tensor(self.written, device=model.device)
         written = int(trainer.strategy.reduce(of_this, reduce_op="sum"))
         if trainer.is_global_zero:

@@ -4,18 +4,39 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from derain.models.layers.across_features import AcrossFeatures
-from derain.models.layers.steps import (
+from derain.models.beam_steps import (
+    FARTHEST_IN_STEPS,
+    NEAREST_POINT,
+    NEAREST_TO_AXIS,
     NEIGHBOUR_NUMBERS,
     SHELL_REACH,
     SHELLS,
+    STEP_EPSILON,
     USUAL_RANGE,
     active,
+    asinh,
+    farther_by,
 )
 from derain.views.isolated_points import SHELL_MIDDLES
 
 # Added to what is divided by, which may be 0.
 EPSILON = 1e-3
+
+
+class AcrossFeatures(nn.Linear):
+    """As ``nn.Linear``, of features in the first axis and things in the second.
+
+    So everything that is computed for each of many things, such as the points of a scan, goes along
+    memory: in onnxruntime the networks of derain take half the time of the other order.
+
+    Example:
+        >>> AcrossFeatures(3, 5)(torch.rand(3, 1000)).shape
+        torch.Size([5, 1000])
+    """
+
+    def forward(self, features: Tensor) -> Tensor:
+        """Features, float (out, N), of features, float (in, N)."""
+        return torch.addmm(self.bias[:, None], self.weight, features)
 
 
 class Geometry(nn.Module):
@@ -65,7 +86,7 @@ class Geometry(nn.Module):
         Args:
             seen: Where their neighbours are, float (NEIGHBOUR_NUMBERS, k - 1, S), and ...
             far: ... logarithms of their ranges over the usual one, float (S,), as of
-                :func:`~derain.models.cues.beams.in_steps`.
+                :func:`~derain.models.cues.geometry.in_steps`.
             others: The point itself, then its neighbours, as numbers of isolated points; S where
                 they are crowded; int64 (k, S).
             counts: Points of the scan by shell and rank of intensity, float (SHELLS, RANKS).
@@ -109,3 +130,46 @@ class Geometry(nn.Module):
     def _shares(self, far: Tensor) -> Tensor:
         """How much each logarithm of range belongs to each centre, float (centres, S)."""
         return torch.softmax(-(((far - self.centres) / SHELL_REACH) ** 2), dim=0)
+
+
+def in_steps(
+    points: Tensor, distances: Tensor, neighbours: Tensor, step: Tensor
+) -> tuple[Tensor, Tensor]:
+    """Where each point's neighbours are, along its beam and across it.
+
+    A step is the angle between neighbouring beams, the angular resolution of the sensor. In metres
+    it is that angle times the range of the point.
+
+    Args:
+        points: x, y, z in metres, in the sensor's frame, float (M, 3).
+        distances: Distances to the neighbours, metres, float (k, S).
+        neighbours: Of each of S points itself, then its neighbours, as numbers of ``points``, int64
+            (k, S).
+        step: Radians, float ().
+
+    Returns:
+        Of each neighbour but the point itself, in steps: the logarithm of its distance; and as
+        inverse hyperbolic sines how much farther it is from the sensor, how far aside it is, on
+        whichever side, and how far up; float (NEIGHBOUR_NUMBERS, k - 1, S). And the logarithms of
+        the points' ranges over 10 m, float (S,).
+    """
+    places = functional.embedding(neighbours, points).permute(2, 0, 1)
+    x, y, z = places[:, 0]
+    ahead, left, up = places[:, 1:] - places[:, :1]
+    level = (x * x + y * y).sqrt().clamp_min(NEAREST_TO_AXIS)
+    distance = (x * x + y * y + z * z).sqrt().clamp_min(NEAREST_POINT)
+    level_dot = x * ahead + y * left
+    outwards = level_dot / level
+    aside = (x * left - y * ahead) / level
+    risen = (level * up - z * outwards) / distance
+    farther = farther_by(distance, level_dot + z * up, distances[1:])
+    per_step = 1 / (distance * step)
+    seen = torch.stack(
+        [
+            torch.log(distances[1:] * per_step + STEP_EPSILON),
+            asinh(farther * per_step),
+            asinh(aside.abs() * per_step),
+            asinh(risen * per_step),
+        ]
+    )
+    return seen.clamp(-FARTHEST_IN_STEPS, FARTHEST_IN_STEPS), torch.log(distance / USUAL_RANGE)

@@ -10,10 +10,9 @@ from torch.nn import functional
 
 from derain.errors import InputError
 from derain.learning.batch import Batch
+from derain.models.beam_steps import both_logits, one_cycle
 from derain.models.cues.network import APART, CueNetwork
-from derain.models.one_cycle import one_cycle
 from derain.models.registry import NETWORKS
-from derain.models.relative_outdet.network import both_logits
 from derain.models.supervised import SupervisedModule
 from derain.scan import Scan
 from derain.views.isolated_points import CHANNELS, IsolatedPointView

@@ -1,16 +1,13 @@
 """The network: geometry, then brightness as the scan itself calibrates it, weighed together."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
 
-from derain.models.cues.beams import in_steps, taken
-from derain.models.cues.brightness import calibrated
-from derain.models.cues.geometry import Geometry
-from derain.models.layers.across_features import AcrossFeatures
-from derain.models.layers.steps import NEAREST_POINT, USUAL_RANGE
-from derain.models.relative_outdet.network import both_logits
+from derain.models.beam_steps import NEAREST_POINT, USUAL_RANGE, both_logits
+from derain.models.cues.geometry import AcrossFeatures, Geometry, in_steps
 from derain.views.intensity_rank import INTENSITY_RANKS
 
 # Log-odds are cut to this either way; those of crowded neighbours are taken to be the second.
@@ -34,6 +31,17 @@ ROUNDS = 2
 
 # Numbers of a point that a fusion weighs besides the features of geometry.
 CUE_NUMBERS = 19
+
+# Points that every shell is taken to hold besides its own, as bright as all of it: where few points
+# are, or little rain, brightness means little.
+# Source: modelling choice, as is the constant below.
+PSEUDO_POINTS = 100.0
+
+# Log-odds of brightness never exceed this, either way.
+LARGEST_LOG_ODDS = 6.0
+
+# Added to counts that others are divided by, or of which logarithms are taken.
+LEAST_COUNT = 1e-6
 
 
 class CueNetwork(nn.Module):
@@ -226,3 +234,73 @@ class Cues:
                 *self._places,
             ]
         )
+
+
+@dataclass(frozen=True)
+class Brightness:
+    """What intensities mean in one scan.
+
+    Attributes:
+        log_odds: Log-odds of rain by shell and rank of intensity, 0 where that means nothing, float
+            (SHELLS * INTENSITY_RANKS,).
+        rain: Points of rain in each shell, float (SHELLS,).
+        separation: How well intensity tells rain from the rest in each shell: the mean of the
+            log-odds over its rain, float (SHELLS,).
+        share: Share of rain in each shell, float (SHELLS,).
+    """
+
+    log_odds: Tensor
+    rain: Tensor
+    separation: Tensor
+    share: Tensor
+
+
+def calibrated(counts: Tensor, cell: Tensor, probability: Tensor) -> Brightness:
+    """What intensities mean, by points that may be rain; the others are taken not to be.
+
+    How bright rain is depends on the sensor, and no training shows it. The scan does: where most of
+    its points are judged well without intensity, histograms over them show how bright rain is here,
+    at each range, and how bright the rest.
+
+    Args:
+        counts: Points of the scan by shell and rank, float (SHELLS, INTENSITY_RANKS).
+        cell: Shell and rank of those that may be rain, int64 (S,).
+        probability: How probably each is, float (S,).
+    """
+    # In float64, for sums of float32 over a whole scan differ from one runtime to another.
+    rain = counts.new_zeros(counts.numel(), dtype=torch.float64)
+    rain = _smoothed(rain.scatter_add(0, cell, probability.double()).reshape(counts.shape))
+    rest = (_smoothed(counts.double()) - rain).clamp_min(0)
+    rain_in_shell, rest_in_shell = rain.sum(1, keepdim=True), rest.sum(1, keepdim=True)
+    in_shell = rain_in_shell + rest_in_shell
+    usual = (rain + rest + LEAST_COUNT) / (in_shell + LEAST_COUNT * INTENSITY_RANKS)
+    of_rain = (rain + PSEUDO_POINTS * usual) / (rain_in_shell + PSEUDO_POINTS)
+    of_rest = (rest + PSEUDO_POINTS * usual) / (rest_in_shell + PSEUDO_POINTS)
+    log_odds = (of_rain.log() - of_rest.log()).clamp(-LARGEST_LOG_ODDS, LARGEST_LOG_ODDS)
+    results = (
+        log_odds.flatten(),
+        rain_in_shell[:, 0],
+        (of_rain * log_odds).sum(1),
+        (rain_in_shell / (in_shell + 1))[:, 0],
+    )
+    return Brightness(*(result.to(probability.dtype) for result in results))
+
+
+def _smoothed(counts: Tensor) -> Tensor:
+    """Counts by shell and rank with half of each spread to the four beside it; sums stay."""
+    return _along(_along(counts).T).T
+
+
+def _along(rows: Tensor) -> Tensor:
+    """Each row with half of it spread to the rows beside it."""
+    before = torch.cat([rows[:1], rows[:-1]])
+    after = torch.cat([rows[1:], rows[-1:]])
+    return 0.5 * rows + 0.25 * (before + after)
+
+
+def taken(values: Tensor, numbers: Tensor) -> Tensor:
+    """Some of the values by their numbers, in the shape of these.
+
+    It is ``values[numbers]``, in a form that onnxruntime computes several times faster.
+    """
+    return values.index_select(0, numbers.flatten()).reshape(numbers.shape)

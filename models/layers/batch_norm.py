@@ -31,13 +31,10 @@ class PixelBatchNorm(_Lenient, nn.BatchNorm2d):
     def forward(self, features: Tensor) -> Tensor:
         """Normalises float (B, channels, H, W)."""
         normalised = super().forward(features)
-        if normalised.requires_grad and _is_channels_last(normalised):
+        is_channels_last = normalised.is_contiguous(memory_format=torch.channels_last)
+        if normalised.requires_grad and is_channels_last:
             normalised.register_hook(_dense)
         return normalised
-
-
-def _is_channels_last(features: Tensor) -> bool:
-    return features.is_contiguous(memory_format=torch.channels_last)
 
 
 def _dense(gradient: Tensor) -> Tensor:

@@ -63,17 +63,7 @@ class _Padding(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, image: Tensor, margin: int) -> Tensor:
         ctx.margin = margin
-        height, width = image.shape[-2:]
-        padded = image.new_empty(*image.shape[:-2], height + 2 * margin, width + 2 * margin)
-        if image.ndim == 4 and image.is_contiguous(memory_format=torch.channels_last):
-            padded = padded.contiguous(memory_format=torch.channels_last)
-        padded[..., margin:-margin, margin:-margin] = image
-        rows = padded[..., margin:-margin, :]
-        for place in (*range(-margin, 0), *range(width, width + margin)):
-            rows[..., margin + place] = image[..., place % width]
-        for place in (*range(-margin, 0), *range(height, height + margin)):
-            padded[..., margin + place, :] = rows[..., _mirrored(place, height), :]
-        return padded
+        return _padded(image, margin)
 
     @staticmethod
     @once_differentiable

@@ -16,7 +16,7 @@ import numpy as np
 import torch
 from lightning.pytorch.utilities.types import OptimizerLRScheduler
 from numpy.typing import NDArray
-from torch import Tensor
+from torch import Tensor, nn
 
 from derain.cards.card import DataCard
 from derain.errors import InputError
@@ -24,15 +24,14 @@ from derain.files.documents import Entry
 from derain.learning.batch import Batch
 from derain.learning.task import EXAMPLE_SCANS
 from derain.models.base import DerainingModule
-from derain.models.lisnownet.deployed import (
-    DeployedLiSnowNet,
+from derain.models.lisnownet.network import LiSnowNetwork
+from derain.models.lisnownet.selection_rule import (
+    SelectionRule,
     cube_roots,
     denoising_change,
     may_be_rain,
     rain_logits,
 )
-from derain.models.lisnownet.network import LiSnowNetwork
-from derain.models.lisnownet.selection_rule import SelectionRule
 from derain.models.lisnownet.sparsity import RESIDUALS, sparsity_loss
 from derain.models.published import Published
 from derain.models.range_module import FITTED, range_view, require_grid
@@ -41,7 +40,24 @@ from derain.scan import Scan
 from derain.views.range_image import RangeView
 from derain.views.view import View
 
-__all__ = ["DeployedLiSnowNet", "LiSnowNet", "LiSnowNetwork"]
+
+class DeployedLiSnowNet(nn.Module):
+    """The network with its selection rule: from a raw range image to logits of its pixels.
+
+    Args:
+        network: A trained network.
+        rule: What it calls rain.
+    """
+
+    def __init__(self, network: LiSnowNetwork, rule: SelectionRule) -> None:
+        super().__init__()
+        self.network = network
+        self.rule = rule
+
+    def forward(self, image: Tensor, valid: Tensor) -> Tensor:
+        """Scores every pixel; arguments and result as for :class:`LiSnowNet`."""
+        seen = cube_roots(image, self.rule)
+        return rain_logits(image, valid, seen, self.network(seen, valid), self.rule)
 
 
 @NETWORKS.add("lisnownet")
@@ -115,8 +131,6 @@ class LiSnowNet(DerainingModule, Published):
         self.selection = SelectionRule.fitted(rule, [])
         # Images that the rule's residual is fitted to, the same after every epoch of a training.
         self._examples: list[tuple[Tensor, Tensor]] | None = None
-        # What the network makes of them by now, while it is validated.
-        self._denoised: list[tuple[Tensor, Tensor, Tensor]] = []
         self.adopt(spec)
 
     @classmethod
@@ -174,7 +188,7 @@ class LiSnowNet(DerainingModule, Published):
         """Loss with its parts, from the images alone, and logits."""
         image, valid = batch.inputs["image"], batch.inputs["valid"]
         seen = cube_roots(image, self.selection)
-        denoised = self._denoise(image, valid, seen)
+        denoised = self.network(seen, valid)
         loss = sparsity_loss(
             denoised, seen, valid, *(self.hparams[name] for name in ("alpha", "beta", "norm"))
         )
@@ -185,60 +199,41 @@ class LiSnowNet(DerainingModule, Published):
             "residual": loss.residual,
         }, rain_logits(image, valid, seen, denoised.detach(), self.selection)
 
+    def on_fit_start(self) -> None:
+        """Drops the images that an earlier training was fitted to."""
+        self._examples = None
+
     def on_validation_epoch_start(self) -> None:
         """Fits the rule's residual, where it is not stated, to what the network changes by now.
 
         Before anything is scored: the epoch's scores are those of the checkpoint that it leaves.
         """
         super().on_validation_epoch_start()
-        self._denoised = []
         training = self.trainer.state.fn == "fit" and not self.trainer.sanity_checking
         if not training or "residual" in self.hparams["rule"]:
             return
         if self._examples is None:
-            self._examples = [self._seen(scan) for scan in self.validation_scans(EXAMPLE_SCANS)]
+            self._examples = [self._image_of(scan) for scan in self.validation_scans(EXAMPLE_SCANS)]
         if not self._examples:  # batches that were made elsewhere
             return
         with self.trainer.precision_plugin.val_step_context():  # as the batches are scored
-            self._denoised = [
-                (image, valid, self.network(cube_roots(image, self.selection), valid))
-                for image, valid in self._examples
-            ]
-        changes = np.concatenate([self._changes(*example) for example in self._denoised])
+            changes = np.concatenate([self._changes(*example) for example in self._examples])
         rule = self.selection.with_residual_of(changes)
         # Several processes go on with one rule, however each has rounded.
         rule = replace(rule, residual=self.trainer.strategy.broadcast(rule.residual))
         self._log_identical({"val/rule_residual": torch.tensor(rule.residual)})
         self.adopt(replace(self.spec, rule=rule.as_dict()))
 
-    def on_fit_start(self) -> None:
-        """Forgets what the rule was fitted to in a training that did not come to its end."""
-        self._examples = None
-
-    def on_validation_epoch_end(self) -> None:
-        """Logs losses and scores; from here on the network changes."""
-        self._denoised = []
-        super().on_validation_epoch_end()
-
-    def on_fit_end(self) -> None:
-        """Lets go of what the rule was fitted to."""
-        self._examples = None
-
-    def _seen(self, scan: Scan) -> tuple[Tensor, Tensor]:
+    def _image_of(self, scan: Scan) -> tuple[Tensor, Tensor]:
+        """What :meth:`forward` takes of a scan."""
         inputs = self.spec.make_view()(scan).inputs()
         image, valid = (torch.from_numpy(inputs[name]) for name in ("image", "valid"))
         return image.to(self.device), valid.to(self.device)
 
-    def _denoise(self, image: Tensor, valid: Tensor, seen: Tensor) -> Tensor:
-        """What the network makes of images; known of those that the rule was just fitted to."""
-        for known_image, known_valid, denoised in self._denoised:
-            if torch.equal(known_image, image) and torch.equal(known_valid, valid):
-                return denoised
-        return self.network(seen, valid)
-
-    def _changes(self, image: Tensor, valid: Tensor, denoised: Tensor) -> NDArray[np.float32]:
+    def _changes(self, image: Tensor, valid: Tensor) -> NDArray[np.float32]:
         """What the network changes of the returns that the rule's limits leave, float32 (M,)."""
-        changes = denoising_change(cube_roots(image, self.selection), denoised)
+        seen = cube_roots(image, self.selection)
+        changes = denoising_change(seen, self.network(seen, valid))
         return changes[valid & may_be_rain(image, self.selection)].cpu().numpy()
 
     def configure_optimizers(self) -> OptimizerLRScheduler:

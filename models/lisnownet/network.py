@@ -14,10 +14,9 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from derain.errors import InputError
+from derain.learning.losses import at_least_float32
 from derain.models.layers.batch_norm import PixelBatchNorm
 from derain.models.layers.padding import pad_around, pad_to_multiple
-from derain.models.lisnownet.haar import haar, inverse_haar
-from derain.models.lisnownet.hole_filling import fill_holes
 from derain.models.published import network_of, published_tensors
 
 HALVINGS = 4
@@ -209,3 +208,96 @@ def published_key(name: str) -> str:
     for ours, published in PUBLISHED_WORDS.items():
         name = name.replace(ours, published)
     return name
+
+
+def haar(image: Tensor) -> Tensor:
+    """One level of the two-dimensional Haar transform of images.
+
+    Each 2 × 2 block of pixels, read as (top left, top right, bottom left, bottom right), is
+    multiplied by an orthonormal basis, which is symmetric and so its own inverse. Energy is kept.
+
+    Slices and sums are as fast in onnxruntime as strided convolutions or pixel shuffles.
+
+    Args:
+        image: float (B, C, H, W), H and W even.
+
+    Returns:
+        float (B, 4 C, H / 2, W / 2), band by band: the averages (times 2) of all channels, then
+        their details from top to bottom, from left to right, and along the diagonal.
+
+    Source: A. Haar, 1910; the order of pixels and bands is that of LiSnowNet.
+    """
+    return _times_basis(
+        image[..., ::2, ::2], image[..., ::2, 1::2], image[..., 1::2, ::2], image[..., 1::2, 1::2]
+    )
+
+
+def inverse_haar(bands: Tensor) -> Tensor:
+    """Undoes :func:`haar`.
+
+    Args:
+        bands: float (B, 4 C, H, W), ordered as :func:`haar` does.
+
+    Returns:
+        float (B, C, 2 H, 2 W).
+    """
+    top_left, top_right, bottom_left, bottom_right = _times_basis(*bands.chunk(4, dim=1)).chunk(
+        4, dim=1
+    )
+    top = torch.stack([top_left, top_right], dim=-1).flatten(-2)
+    bottom = torch.stack([bottom_left, bottom_right], dim=-1).flatten(-2)
+    return torch.stack([top, bottom], dim=-2).flatten(-3, -2)
+
+
+def _times_basis(a: Tensor, b: Tensor, c: Tensor, d: Tensor) -> Tensor:
+    return torch.cat([a + b + c + d, a + b - c - d, a - b + c - d, a - b - c + d], dim=1) / 2
+
+
+def fill_holes(image: Tensor, valid: Tensor) -> Tensor:
+    """Gives every empty pixel a value that suits its surroundings; valid pixels keep theirs.
+
+    A pixel beside valid ones takes the greatest of them; any other takes its row's mean plus one
+    standard deviation. Where the image bulges, edges are sharpened, and all is smoothed.
+
+    The published formulas hold wherever they are defined. Where they are 0 / 0, in a row without
+    any value to take a mean of, that of the whole image stands in, and an image without a valid
+    pixel is 0. Values and gradients are finite for the cube root of every finite float32, and
+    computed in float32 or wider, under autocast too.
+
+    Args:
+        image: float (B, channels, H, W). Values where nothing is valid are never looked at.
+        valid: Which pixels hold a return, bool (B, 1, H, W).
+
+    Returns:
+        float32 or wider, (B, channels, H, W).
+    """
+    image = at_least_float32(image)
+    nothing = torch.finfo(image.dtype).min
+    greatest = functional.max_pool2d(pad_around(torch.where(valid, image, nothing), 1), 3, stride=1)
+    known = greatest[:, :1] > nothing
+    dense = torch.where(valid, image, greatest)
+    dense = torch.where(known, dense, _row_level(dense, known))
+    sharpened = dense + functional.relu(_laplacian(dense))
+    smoothed = functional.avg_pool2d(pad_around(sharpened, 2), 5, stride=1)
+    return torch.where(valid, image, smoothed)
+
+
+def _row_level(image: Tensor, known: Tensor) -> Tensor:
+    """Level of each row's known pixels, or of the image's where the row has none."""
+    row = _level(image, known, (-1,))
+    whole = _level(image, known, (-2, -1))
+    return torch.where(known.any(dim=-1, keepdim=True), row, whole)
+
+
+def _level(image: Tensor, known: Tensor, dim: tuple[int, ...]) -> Tensor:
+    """Mean plus standard deviation of the known pixels; 0 where there are none."""
+    count = known.sum(dim, keepdim=True, dtype=image.dtype).clamp(min=1)
+    mean = torch.where(known, image, 0).sum(dim, keepdim=True) / count
+    deviation = torch.where(known, image - mean, 0)
+    # The norm's gradient is 0 at 0, where that of the variance's square root is infinite.
+    return mean + torch.linalg.vector_norm(deviation, dim=dim, keepdim=True) / count.sqrt()
+
+
+def _laplacian(image: Tensor) -> Tensor:
+    """Mean of a pixel's eight neighbours less the pixel itself."""
+    return (functional.avg_pool2d(pad_around(image, 1), 3, stride=1) - image) * 9 / 8

@@ -5,10 +5,13 @@ from dataclasses import asdict, dataclass, fields, replace
 from typing import Self
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 from derain.errors import InputError
 from derain.files.documents import Entry
+from derain.models.range_module import per_pixel
 from derain.scan import Scan
 from derain.views.full_scale import full_scale
 
@@ -21,13 +24,18 @@ ROAD_PERCENTILE = 5
 # With it, the limit that is fitted to WADS is the published one, -1.8 m.
 ABOVE_ROAD = 0.4
 
-
 # A residual is fitted to this many returns at least, and is at least an eighth of the one published
 # for WADS: less is what the network changes where nothing falls.
 FEWEST, LEAST_RESIDUAL = 100, 0.001
 
 # Of their logarithms, Otsu's threshold is chosen from as many values.
 OTSU_BINS = 256
+
+# How surely a residual of twice the rule's threshold is rain: its logit.
+STEEPNESS = 4.0
+
+# Logit of what the rule decides whatever the residual is.
+CERTAIN = 20.0
 
 
 @dataclass(frozen=True)
@@ -116,6 +124,52 @@ class SelectionRule:
         measured = {"full_scale": full_scale(scans), "ground": _road(scans) + ABOVE_ROAD}
         known = {name: value for name, value in measured.items() if np.isfinite(value)}
         return cls(**{**known, **stated})
+
+
+def cube_roots(image: Tensor, rule: SelectionRule) -> Tensor:
+    """What the network sees: cube roots of range and of intensity, in 0..1, float (B, 2, H, W).
+
+    Args:
+        image: Range (m), z (m) and intensity (the data's unit), float (B, 3, H, W).
+        rule: Its full scale of intensity.
+    """
+    share = (image[:, 2:] / rule.full_scale).clamp(0, 1)
+    return torch.cat([image[:, :1], share], dim=1) ** (1 / 3)
+
+
+def rain_logits(
+    image: Tensor, valid: Tensor, seen: Tensor, denoised: Tensor, rule: SelectionRule
+) -> Tensor:
+    """Logits of "not rain" and "rain" of every pixel, float (B · H · W, 2), row by row.
+
+    The published rule decides yes or no. Here its limit is a probability of one half, from which
+    the residual moves it. A pixel without a return is not rain.
+
+    Args:
+        image: Range (m), z (m) and intensity (the data's unit), float (B, 3, H, W).
+        valid: Pixels with a return, bool (B, 1, H, W).
+        seen: What the network saw, float (B, 2, H, W).
+        denoised: What it made of that, float (B, 2, H, W).
+        rule: The rule.
+    """
+    excess = denoising_change(seen, denoised) / rule.residual - 1
+    margin = (STEEPNESS * excess).clamp(-CERTAIN, CERTAIN)
+    margin = torch.where(may_be_rain(image, rule), margin, -CERTAIN)
+    margin = torch.where(image[:, :1] < rule.near, CERTAIN, margin)
+    margin = torch.where(valid, margin, -CERTAIN)
+    return per_pixel(torch.cat([-margin, margin], dim=1) / 2)
+
+
+def denoising_change(seen: Tensor, denoised: Tensor) -> Tensor:
+    """What denoising changed: of range, times that of intensity cubed, float (B, 1, H, W)."""
+    of_range, of_intensity = (denoised - seen).split(1, dim=1)
+    return of_range * of_intensity**3
+
+
+def may_be_rain(image: Tensor, rule: SelectionRule) -> Tensor:
+    """Which pixels may be rain by their height and intensity, bool (B, 1, H, W)."""
+    _, height, intensity = image.split(1, dim=1)
+    return (height > rule.ground) & (intensity < rule.intensity * rule.full_scale)
 
 
 def otsu(values: NDArray[np.float32]) -> float:

@@ -15,7 +15,7 @@ import torch
 from torch import Tensor
 
 from derain.learning.losses import at_least_float32
-from derain.models.lisnownet.haar import haar
+from derain.models.lisnownet.network import haar
 
 # What the residual takes the mean of, by the name of its norm: each change's size, or its square.
 RESIDUALS: dict[str, Callable[[Tensor], Tensor]] = {"l1": torch.abs, "l2": torch.square}

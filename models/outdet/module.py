@@ -14,8 +14,7 @@ from torch import Tensor
 
 from derain.cards.card import DataCard
 from derain.errors import InputError
-from derain.models.outdet.deployed import FoldedOutDet
-from derain.models.outdet.network import OutDetNetwork
+from derain.models.outdet.network import FoldedOutDet, OutDetNetwork
 from derain.models.published import Published
 from derain.models.registry import NETWORKS
 from derain.models.supervised import SupervisedModule

@@ -68,10 +68,3 @@ def test_a_model_that_names_none_is_given_none(data: Folder) -> None:
     agree_on_task(OutDet(), data)
     assert data.card.extra == {}
     assert data.read(data.frames("train")[0]).fields == {}
-
-
-def test_what_the_card_says_of_a_channel_is_not_measured(data: Folder) -> None:
-    data.card = data.card.completed(extra={"rcs": (1.0, 2.0)})
-    agree_on_task(OutDet(channels=("x", "y", "z", "rcs", "doppler")), data)
-    assert set(data.card.extra) == {"rcs", "doppler"}
-    assert data.card.extra["rcs"] == (1, 2)

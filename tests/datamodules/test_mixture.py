@@ -139,15 +139,9 @@ def test_validation_is_of_all_parts_together_and_told_of_each(tmp_path: Path) ->
 
 def test_only_parts_that_are_named_are_measured() -> None:
     data = mixture(measured=["spray"])
-    assert [frame.key for frame in data.source("validation")] == [
-        f"spray/{number:06d}" for number in range(4)
-    ]
+    keys = [frame.key for frame in data.source("validation")]
+    assert keys == [f"spray/{number:06d}" for number in range(4)]
     assert len(data.source("train")) == 12
-    run = trainer(max_epochs=1, enable_checkpointing=False)
-    run.fit(OutDet(neighbours=3), data)
-    logged = run.callback_metrics
-    assert logged["val/iou"] == logged["val/spray/iou"]
-    assert "val/snow/iou" not in logged
 
 
 def test_the_record_holds_the_scans_of_all_parts(

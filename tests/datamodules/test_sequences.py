@@ -86,13 +86,3 @@ def test_a_part_without_scans_is_refused(root: Path, split: dict, part: str, mes
     with pytest.raises(InputError, match=message) as refusal:
         Rehearse3D(root=str(root), split=split).frames(part)
     assert str(root) in str(refusal.value)
-
-
-def test_the_real_sequence_is_found(shared: Path) -> None:
-    data = Wads(root=str(shared / "data/wads"), split={"train": ["36"]})
-    frames = data.frames("train")
-    assert len(frames) == 10
-    scan = data.read(frames[0])
-    assert len(scan) > 200_000
-    assert scan.label is not None
-    assert {110, 111} <= set(scan.label.tolist())

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from derain.cards.card import DataCard
-from derain.datamodules.statistics import with_statistics
+from derain.datamodules.base import with_statistics
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases
 from derain.scan import Scan
@@ -83,12 +83,6 @@ def test_a_channel_of_which_no_scan_holds_a_number_is_refused() -> None:
     for name in ("doppler", "dopler"):
         with pytest.raises(InputError, match=f"channel '{name}': no training scan holds a number"):
             with_statistics(CARD, [nothing], [name])
-
-
-def test_points_of_unknown_class_do_not_count_for_the_share_of_rain() -> None:
-    scan = Scan.of(np.ones((4, 4))).with_label(np.array([0, 3, 9, 9]))
-    card = DataCard("ours", {0: "ground", 3: "rain", 9: "unknown"}, rain=(3,), unknown=(9,))
-    assert with_statistics(card, [scan]).rain_share == 0.5
 
 
 def test_hard_scans_give_statistics_that_can_be_divided_by() -> None:

@@ -13,13 +13,10 @@ from derain.datamodules.base import Loading, ScanDataModule
 from derain.datamodules.labelled import card_of, labelled_scans
 from derain.datamodules.taught import Taught
 from derain.errors import InputError
-from derain.evaluation.baselines import no_points
 from derain.evaluation.hard_cases import scene
-from derain.evaluation.scores import score
 from derain.files.labels import write_labels
 from derain.filters import DROR, FilterDerainer
 from derain.sources.folders import named_frames
-from derain.sources.training_record import SCANS
 
 POINTS = 200
 
@@ -70,25 +67,6 @@ def test_scans_are_read_with_the_teachers_labels_and_as_it_saw_them(root: Path) 
     np.testing.assert_array_equal(data.card.rain_of(scan), known & rain)
 
 
-def test_statistics_and_the_record_are_of_the_training_scans(root: Path) -> None:
-    data = Taught(str(root))
-    data.complete_card()
-    scans = [data.read(frame) for frame in data.frames("train")]
-    known = [~data.card.unknown_of(scan) for scan in scans]
-    rain = sum(int(data.card.rain_of(scan).sum()) for scan in scans)
-    assert data.card.rain_share == pytest.approx(rain / sum(map(np.count_nonzero, known)))
-    prints = {frame.fingerprint() for frame in data.source("train")}
-    assert data.training_record() == {SCANS: tuple(sorted(prints))}
-
-
-def test_no_target_is_given_for_points_that_are_not_known(root: Path, connect) -> None:
-    data = connect(Taught(str(root), Loading(batch_size=1)))
-    for batch, frame in zip(data.val_dataloader(), data.frames("validation"), strict=True):
-        known = ~data.card.unknown_of(data.read(frame))
-        assert 0 < known.sum() < POINTS
-        assert int((batch.target >= 0).sum()) == known.sum()
-
-
 def test_commands_that_measure_know_the_folder(root: Path) -> None:
     card = card_of([root], None)
     assert card.name.endswith("taught by between")
@@ -96,17 +74,6 @@ def test_commands_that_measure_know_the_folder(root: Path) -> None:
     assert [len(data.source(part)) for part in ("train", "test")] == [6, 2]
     with pytest.raises(InputError, match="is a data set, of which no part can be taken"):
         labelled_scans([root, root], card, Loading())
-
-
-def test_scores_are_agreement_with_the_teacher(root: Path, tmp_path: Path) -> None:
-    source = named_frames([tmp_path / "drives"])
-    dror = FilterDerainer(DROR(), 1)
-    teach(dror, source, tmp_path / "by_dror")
-    data = labelled_scans([tmp_path / "by_dror"], card_of([tmp_path / "by_dror"], None), Loading())
-    scans = [data.read_measured(frame) for frame in data.frames("test")]
-    itself, nothing = score([dror, no_points], scans, data.card)
-    assert itself.pooled.true_positive > 0
-    assert (itself.pooled.iou, nothing.pooled.iou) == (1, 0)
 
 
 def test_what_is_no_such_folder_is_refused(tmp_path: Path) -> None:

@@ -62,7 +62,7 @@ def judging_candidates(
     model = deepcopy(random_outdet)
     model.adopt(replace(model.spec, candidates=candidates))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("derain.models.outdet.deployed.BLOCKS", 1)  # traced several times as quickly
+        patch.setattr("derain.models.outdet.network.BLOCKS", 1)  # traced several times as quickly
         return made_once("examples_candidates.onnx", partial(export, model))
 
 

@@ -31,7 +31,7 @@ def judging_candidates(random_outdet: OutDet, made_once: Callable[..., Path]) ->
     model = deepcopy(random_outdet)
     model.adopt(replace(model.spec, candidates=NEAR_AND_DIM))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("derain.models.outdet.deployed.BLOCKS", 2)
+        patch.setattr("derain.models.outdet.network.BLOCKS", 2)
         return made_once("candidates.onnx", partial(export, model))
 
 

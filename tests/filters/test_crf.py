@@ -134,20 +134,6 @@ def test_the_sweep_goes_once_around_from_behind_where_y_is_any_zero() -> None:
     assert _along_the_sweep(xyz).tolist() == [3, 1, 4, 0, 2]
 
 
-@pytest.mark.parametrize("towards", [1, -1])
-def test_a_verdict_spreads_along_the_order_to_its_end(towards: int) -> None:
-    points = 5000
-    line = np.arange(points)
-    feature = np.full(points, 0.1)
-    feature[0] = -1
-    neighbours = np.stack([line, np.maximum(line - 1, 0), np.minimum(line + 1, points - 1)], axis=1)
-    distances = np.abs(neighbours - line[:, None]).astype(np.float32)
-    rain = decide_sequentially(feature, line, line[::towards], neighbours, distances, 2.0)
-    # From the one that is none, "no rain" goes on and on; against the order it stays where it is.
-    expected = 0 if towards > 0 else points - 2
-    assert np.count_nonzero(rain) == pytest.approx(expected, abs=1)
-
-
 @settings(deadline=None, max_examples=100)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.integers(2, 12), st.floats(0.3, 30))
 def test_the_published_variant_does_what_its_formulas_say(

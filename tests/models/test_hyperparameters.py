@@ -8,7 +8,7 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 from tensorboard.plugins.hparams.metadata import EXPERIMENT_TAG, SESSION_START_INFO_TAG
 from tensorboard.plugins.hparams.plugin_data_pb2 import HParamsPluginData
 
-from derain.models.hyperparameters import log_hyperparameters
+from derain.models.measured import log_hyperparameters
 
 
 def entered(folder: Path) -> Any:

@@ -1,6 +1,5 @@
 """3D-OutDet computes what was published, whatever it is given."""
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -94,20 +93,6 @@ def test_the_model_normalises_what_the_network_sees(outdet: MakeModel, sample: M
     np.testing.assert_allclose(logits.detach(), expected, atol=2e-4)
 
 
-def test_training_drops_half_of_the_features_and_doubles_the_rest(
-    outdet: MakeModel, sample: MakeSample
-) -> None:
-    network, inputs = outdet().network.train(), inputs_of(sample(scene(400)))
-    network.head = torch.nn.Identity()
-    torch.manual_seed(0)
-    dropped = network(**inputs)
-    network.dropout.p = 0.0
-    whole = network(**inputs)
-    kept = dropped != 0
-    assert kept.float().mean() == pytest.approx(0.5, abs=0.03)
-    torch.testing.assert_close(dropped[kept], 2 * whole[kept])
-
-
 @torch.no_grad()
 def test_candidates_are_scored_as_they_are_among_all(outdet: MakeModel, sample: MakeSample) -> None:
     model = outdet(seed=6)
@@ -124,14 +109,6 @@ def test_candidates_are_scored_as_they_are_among_all(outdet: MakeModel, sample: 
 
 def test_it_has_as_many_parameters_as_published() -> None:
     assert sum(parameter.numel() for parameter in OutDet().parameters()) == 11_019
-
-
-def test_further_channels_widen_what_sees_points_and_nothing_else() -> None:
-    usual = OutDetNetwork().state_dict()
-    wider = OutDetNetwork(channels=6).state_dict()
-    changed = {name for name in usual if usual[name].shape != wider[name].shape}
-    assert changed == {"weight1", "shortcut"}
-    assert wider["weight1"].shape == (7, 32, 9)
 
 
 @pytest.mark.parametrize("channels", [(), ("x", "y", "x")], ids=str)
@@ -198,14 +175,6 @@ def test_weights_of_another_network_are_refused(
         OutDetNetwork.from_published(weights)
 
 
-@pytest.mark.parametrize("name", ["salsanext", "lisnownet"])
-def test_weights_of_the_other_published_networks_are_refused(shared: Path, name: str) -> None:
-    shapes = json.loads((shared / "oracles/shapes.json").read_text())[name]
-    weights = {key: torch.zeros(shape) for key, shape in shapes.items()}
-    with pytest.raises(InputError, match="3D-OutDet: the state_dict is of another network"):
-        OutDetNetwork.from_published(weights)
-
-
 @pytest.fixture(scope="module")
 def on_wads(shared: Path) -> tuple[OutDet, Sample, Tensor]:
     """The published weights, the published scan, and the logits of the one for the other."""
@@ -259,42 +228,9 @@ def test_the_folded_network_computes_the_same(
     torch.testing.assert_close(folded, logits, atol=2e-4, rtol=2e-4)
 
 
-def test_folding_leaves_the_model_as_it_was(outdet: MakeModel) -> None:
-    model = outdet()
-    before = {name: tensor.clone() for name, tensor in model.state_dict().items()}
-    folded = model.deployed()
-    assert not any(parameter.requires_grad for parameter in folded.parameters())
-    for name, tensor in model.state_dict().items():
-        assert torch.equal(tensor, before[name])
-
-
 def test_packed_scans_get_the_logits_they_get_alone(outdet: MakeModel, sample: MakeSample) -> None:
     model = outdet()
     samples = [sample(scene(points, points)) for points in (300, 0, 7, 1, 500)]
     batch = Batch.of(samples)
     for logits, own in zip(batch.split(model(**batch.inputs)), samples, strict=True):
         torch.testing.assert_close(logits, model(**inputs_of(own)), atol=1e-5, rtol=1e-5)
-
-
-def test_batch_statistics_are_those_of_all_points_of_all_scans(
-    outdet: MakeModel, sample: MakeSample
-) -> None:
-    network = outdet().network.double().train()
-    network.dropout.p = 0.0
-    for parameter in (network.norm1, network.norm2):
-        parameter.reset_running_stats()
-    samples = [sample(scene(points, points)) for points in (300, 0, 7, 1, 500)]
-    inputs = {
-        name: tensor.double() if tensor.is_floating_point() else tensor
-        for name, tensor in Batch.of(samples).inputs.items()
-    }
-    expected = as_published(
-        published(network), *(tensor.numpy() for tensor in inputs.values()), training=True
-    )
-    np.testing.assert_allclose(network(**inputs).detach(), expected, rtol=1e-9, atol=1e-9)
-    # The first layer's statistics, with PyTorch's momentum 0.1 and its unbiased variance.
-    distances = network.distance_weight * (inputs["distances"] + 1)
-    seen = torch.cat([inputs["points"][inputs["neighbours"]], distances[..., None]], dim=-1)
-    first = torch.einsum("ijk,klj->il", seen, network.weight1) + network.bias1
-    torch.testing.assert_close(network.norm1.running_mean, 0.1 * first.mean(dim=0))
-    torch.testing.assert_close(network.norm1.running_var, 0.9 + 0.1 * first.var(dim=0))

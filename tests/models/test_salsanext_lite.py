@@ -34,18 +34,6 @@ def image(height: int, width: int, channels: int = 5) -> Tensor:
     return torch.randn(1, channels, height, width, generator=generator)
 
 
-@pytest.mark.parametrize(
-    ("channels", "width", "classes"), [(5, 16, 2), (1, 1, 2), (7, 3, 20), (4, 8, 1)]
-)
-@torch.no_grad()
-def test_every_width_and_number_of_channels_will_do(
-    channels: int, width: int, classes: int
-) -> None:
-    network = small(channels, width, classes)
-    assert (network.channels, network.width, network.classes) == (channels, width, classes)
-    assert network(image(16, 32, channels)).shape == (1, classes, 16, 32)
-
-
 @pytest.mark.parametrize("width", [-2, 0])
 def test_a_width_of_nothing_is_refused(width: int) -> None:
     with pytest.raises(InputError, match=f"width: {width} is not positive"):

@@ -17,10 +17,9 @@ from derain.learning.batch import Batch
 from derain.learning.start import STARTED_FROM
 from derain.learning.task import agree_on_task
 from derain.models.base import DerainingModule
-from derain.models.checkpoint import load_model, save_model
+from derain.models.checkpoint import load_model, save_model, started
 from derain.models.outdet import OutDet
 from derain.models.salsanext import SalsaNext
-from derain.models.start import started
 from derain.scan import Scan
 
 FIRST = DataCard("first", {0: "ground", 1: "rain"}, rain=(1,), licence="free")

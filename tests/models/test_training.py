@@ -1,8 +1,6 @@
 """Training learns, goes on where it stopped, and does the same again from the same seed."""
 
-import copy
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,111 +14,25 @@ from numpy.typing import NDArray
 from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.base import Loading
 from derain.datamodules.folder import Folder
-from derain.datamodules.simulated import Simulated
 from derain.errors import InputError
-from derain.evaluation.baselines import IntensityRule
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
 from derain.learning.batch import Batch
 from derain.learning.losses import class_weights
-from derain.learning.seeds import Draw, generator_of
 from derain.models.base import DerainingModule
 from derain.models.checkpoint import load_model
 from derain.models.lisnownet import LiSnowNet
 from derain.models.measured import MONITOR
 from derain.models.outdet import OutDet
 from derain.models.salsanext import SalsaNext
-from derain.scan import Scan
-from derain.simulation.campaign import Campaign
-from derain.simulation.sensor import Sensor
 from derain.sources.training_record import record_of_scans
-from derain.system.open3d_import import import_open3d
 
 MakeTrainer = Callable[..., lightning.Trainer]
 RAIN = 3
 
 
-class Losses(lightning.Callback):
-    """Keeps the training loss of every epoch."""
-
-    def __init__(self) -> None:
-        self.values: list[float] = []
-
-    def on_train_epoch_end(self, trainer: lightning.Trainer, *_: Any) -> None:
-        self.values.append(trainer.callback_metrics["train/loss"].item())
-
-
-@dataclass(frozen=True)
-class Run:
-    """A finished training."""
-
-    model: OutDet
-    data: Simulated
-    losses: list[float]
-    scores: dict[str, float]
-    probabilities: list[NDArray[np.float32]]
-
-
 def iou(predicted: NDArray[np.bool_], rain: NDArray[np.bool_]) -> float:
     return np.count_nonzero(predicted & rain) / np.count_nonzero(predicted | rain)
-
-
-def truths(data: Simulated, part: str) -> list[tuple[Scan, NDArray[np.bool_]]]:
-    scans = [data.read(frame) for frame in data.frames(part)]
-    return [(scan, scan.label == RAIN) for scan in scans]
-
-
-@pytest.fixture(scope="module")
-def run(make_trainer: MakeTrainer, tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """A 3D-OutDet trained for a few seconds on a tiny simulated campaign."""
-    try:
-        import_open3d()
-    except InputError as error:
-        pytest.skip(str(error))
-    campaign = Campaign(
-        train=8, validation=1, test=1, scans=1, rain_rates=(25,), sensor=Sensor(rows=24, columns=60)
-    )
-    data = Simulated(str(tmp_path_factory.mktemp("simulated") / "track"), campaign)
-    lightning.seed_everything(0)
-    model, losses = OutDet(learning_rate=0.02, weight_decay=0, milestones=(10, 13)), Losses()
-    trainer = make_trainer(epochs=15, callbacks=[losses], limit_val_batches=0)
-    trainer.fit(model, data)
-    (probabilities,) = trainer.predict(model, data)
-    (scores,) = trainer.test(model, data, verbose=False)
-    return Run(model, data, losses.values, scores, probabilities)
-
-
-def test_the_loss_falls(run: Run) -> None:
-    assert len(run.losses) == 15
-    assert run.losses[-1] < 0.5 * run.losses[0]
-
-
-def test_a_trained_network_beats_rules_that_need_no_network(run: Run) -> None:
-    rule = IntensityRule.best(truths(run.data, "train"))
-    ((scan, rain),) = truths(run.data, "test")
-    everything = iou(np.ones(len(scan), bool), rain)
-    assert run.scores["test/iou"] > iou(rule(scan), rain) > everything
-
-
-def test_the_scores_of_a_test_are_those_of_its_predictions(run: Run) -> None:
-    ((_, rain),) = truths(run.data, "test")
-    predicted = run.probabilities[0] > run.model.spec.threshold
-    assert run.scores["test/iou"] == pytest.approx(iou(predicted, rain))
-    assert run.scores["test/recall"] == pytest.approx((predicted & rain).sum() / rain.sum())
-    by_class = run.model.metrics.counts().by_class()
-    assert by_class["rain"].called_rain == (predicted & rain).sum()
-    assert sum(counts.points for counts in by_class.values()) == len(rain)
-
-
-def test_the_model_learns_spec_and_class_weights_from_its_data(run: Run) -> None:
-    card, spec = run.data.card, run.model.spec
-    assert card.has_statistics
-    assert (spec.mean, spec.std, spec.rain) == (card.mean, card.std, card.rain)
-    assert (spec.data, spec.units[3]) == ("simulated rain", "0..255")
-    torch.testing.assert_close(run.model.mean, torch.tensor(card.mean))
-    assert torch.equal(
-        run.model.class_weight, class_weights([1 - card.rain_share, card.rain_share])
-    )
 
 
 @pytest.fixture
@@ -145,21 +57,6 @@ def assert_same(one: torch.nn.Module, other: torch.nn.Module) -> None:
 def differ(one: torch.nn.Module, other: torch.nn.Module) -> bool:
     pairs = zip(one.state_dict().values(), other.state_dict().values(), strict=True)
     return any(not torch.equal(a, b) for a, b in pairs)
-
-
-@pytest.mark.parametrize("workers", [0, 1])
-def test_the_same_seed_gives_the_same_weights_and_another_does_not(
-    make_trainer: MakeTrainer, scenes: Callable[..., Folder], workers: int
-) -> None:
-    def trained(seed: int) -> OutDet:
-        lightning.seed_everything(seed)
-        model = OutDet()
-        make_trainer(epochs=2).fit(model, scenes(batch_size=2, workers=workers))
-        return model
-
-    first = trained(seed=1)
-    assert_same(first, trained(seed=1))
-    assert differ(first, trained(seed=2))
 
 
 @pytest.mark.parametrize("called", [False, True], ids=["nothing is called rain", "all is"])
@@ -300,18 +197,6 @@ def test_a_network_of_candidates_learns_from_them_and_judges_them_alone(
     assert load_model(tmp_path / "run.ckpt").spec == model.spec
 
 
-def test_rain_that_is_everywhere_has_no_candidates(
-    make_trainer: MakeTrainer, scenes: Callable[..., Folder], tmp_path: Path
-) -> None:
-    data = scenes()
-    for number in range(4):
-        anywhere = np.random.default_rng(100 + number).random(300) < 0.3
-        write_labels(tmp_path / f"{number}.label", RAIN * anywhere)
-    model = OutDet(candidates=0.999)
-    make_trainer(epochs=1).fit(model, data)
-    assert model.spec.candidates is None
-
-
 def test_clean_data_teach_a_network_of_labels_nothing(
     make_trainer: MakeTrainer, tmp_path: Path
 ) -> None:
@@ -340,63 +225,3 @@ def test_an_untrained_model_is_not_tested(
 ) -> None:
     with pytest.raises(InputError, match="has not been trained"):
         make_trainer(epochs=1).test(OutDet(), scenes())
-
-
-def test_a_run_goes_through_scans_of_no_point_and_of_one(
-    make_trainer: MakeTrainer, scenes: Callable[..., Folder], tmp_path: Path
-) -> None:
-    for points in (0, 1):
-        scene(300)[:points].tofile(tmp_path / f"tiny{points}.bin")
-        write_labels(tmp_path / f"tiny{points}.label", np.full(points, RAIN))
-    data = scenes(train="tiny*.bin")
-    data.patterns["validation"] = data.patterns["test"] = ["*.bin"]
-    model, trainer = OutDet(), make_trainer(epochs=2)
-    trainer.fit(model, data)
-    assert trainer.global_step == 4
-    assert all(tensor.isfinite().all() for tensor in model.state_dict().values())
-    trainer.test(model, data, verbose=False)
-    measured = model.metrics.counts()
-    assert len(measured.per_scan) == 6
-    assert sum(counts.points for counts in measured.by_class().values()) == 4 * 300 + 1
-
-
-def test_accumulated_batches_make_one_step_on_the_mean_of_their_gradients(
-    make_trainer: MakeTrainer, scenes: Callable[..., Folder]
-) -> None:
-    # Not the step of one batch twice as large: BatchNorm and both losses see whole batches.
-    class Steps(lightning.Callback):
-        def __init__(self) -> None:
-            self.batches: list[Batch] = []
-            self.rates: list[float] = []
-
-        def on_train_batch_start(self, trainer: Any, module: Any, batch: Batch, *_: Any) -> None:
-            self.batches.append(batch)
-
-        def on_train_epoch_start(self, trainer: lightning.Trainer, *_: Any) -> None:
-            self.rates.append(trainer.optimizers[0].param_groups[0]["lr"])
-
-    lightning.seed_everything(0)
-    steps, model = Steps(), OutDet(milestones=(1, 2), weight_decay=0)
-    by_hand = copy.deepcopy(model)
-    trainer = make_trainer(epochs=3, callbacks=[steps], accumulate_grad_batches=2)
-    trainer.fit(model, scenes("[0123].bin"))
-    assert trainer.global_step == 6  # of twelve batches
-    # The schedule counts epochs, however many steps they have.
-    assert steps.rates == pytest.approx([1e-3, 1e-4, 1e-5])
-
-    by_hand.adopt(model.spec)
-    by_hand.class_weight.copy_(model.class_weight)
-    by_hand.train()
-    optimizer = torch.optim.Adam(by_hand.parameters(), lr=1e-3)
-    for number, batch in enumerate(steps.batches):
-        epoch, step = divmod(number, 4)
-        optimizer.param_groups[0]["lr"] = 1e-3 * 0.1**epoch
-        seed = generator_of(Draw.NETWORK, 0, epoch, step, 0).integers(2**63)
-        torch.manual_seed(int(seed))  # of dropout
-        losses, _ = by_hand.losses(batch)
-        (losses["loss"] / 2).backward()
-        if number % 2:
-            optimizer.step()
-            optimizer.zero_grad()
-    for name, tensor in model.state_dict().items():
-        torch.testing.assert_close(by_hand.state_dict()[name], tensor, rtol=1e-5, atol=1e-6)

@@ -22,7 +22,6 @@ from derain.files.labels import write_labels
 from derain.learning.task import agree_on_task
 from derain.models.base import DerainingModule
 from derain.models.callbacks.panels import ScanPanels
-from derain.models.callbacks.prediction import PredictionWriter
 from derain.models.callbacks.report import TestReport
 from derain.models.lisnownet import LiSnowNet
 from derain.models.outdet import OutDet
@@ -126,30 +125,6 @@ def test_files_memory_and_plain_loaders_are_measured_alike(
             np.testing.assert_array_equal(one, other)
 
 
-def test_what_is_predicted_of_scans_in_memory_is_written_by_their_keys(
-    make_trainer: MakeTrainer,
-    scans: list[Scan],
-    memory: InMemory,
-    outdet: Callable[..., OutDet],
-    tmp_path: Path,
-) -> None:
-    model, out = outdet(), tmp_path / "found"
-    writer = PredictionWriter(str(out))
-    make_trainer(1, callbacks=[writer]).predict(model, memory)
-    assert {path.name for path in out.iterdir()} == {"000000.label", "000001.label"}
-    (expected,) = make_trainer(1).predict(model, memory)
-    for place, probability in enumerate(expected):
-        label = np.fromfile(out / f"00000{place}.label", "<u4")
-        np.testing.assert_array_equal(label, probability > model.spec.threshold)
-    by_loader = tmp_path / "by_loader"
-    loader = scan_loader(
-        memory.source("test"), "predict", agree_on_task(model, memory, training=False)
-    )
-    make_trainer(1, callbacks=[PredictionWriter(str(by_loader))]).predict(model, loader)
-    for path in out.iterdir():
-        assert (by_loader / path.name).read_bytes() == path.read_bytes()
-
-
 def test_batches_that_were_made_before_are_trained_on_too(
     make_trainer: MakeTrainer, memory: InMemory, network: Callable[[], DerainingModule]
 ) -> None:
@@ -210,21 +185,6 @@ def test_measuring_on_scans_without_rain_is_warned_of_once(
         assert warning not in capsys.readouterr().err
 
 
-def test_intensities_of_another_unit_are_warned_of_in_what_is_measured(
-    make_trainer: MakeTrainer, memory: InMemory, capsys: pytest.CaptureFixture[str]
-) -> None:
-    model = OutDet()
-    make_trainer(epochs=1).fit(model, memory)
-    for measure, measured in {"validate": "validation", "test": "test"}.items():
-        scans = {part: memory.source(part) for part in ("train", "validation", "test")}
-        frames = scans[measured]
-        scans[measured] = [memory.read(frame).with_intensity_times(1 / 256) for frame in frames]
-        data = InMemory(*scans.values(), card="wads", loading=LOADING)
-        trainer = make_trainer(1, callbacks=[ScanCheck()])
-        getattr(trainer, measure)(model, data, verbose=False)
-        assert "mean intensity 0." in capsys.readouterr().err
-
-
 def test_callbacks_go_without_a_data_module(
     make_trainer: MakeTrainer,
     memory: InMemory,
@@ -241,20 +201,6 @@ def test_callbacks_go_without_a_data_module(
     test = scan_loader(memory.source("test"), "test", task)
     make_trainer(1, callbacks=callbacks, default_root_dir=tmp_path).test(model, test, verbose=False)
     assert "WADS, 2 scans" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize("workers", [0, 1])
-def test_what_a_worker_cannot_read_stops_a_plain_loader_with_its_name(
-    make_trainer: MakeTrainer, files: Folder, workers: int
-) -> None:
-    model = OutDet()
-    task = agree_on_task(model, files)
-    (files.root / "1.bin").write_bytes(b"damaged")
-    damaged = files.source("train")[1:2]  # a worker that is left in the middle takes seconds to end
-    loader = scan_loader(damaged, "train", task, Loading(workers=workers))
-    with pytest.raises(InputError, match=r"1\.bin: 7 bytes are not whole rows") as refusal:
-        make_trainer(epochs=1).fit(model, loader)
-    assert "Traceback" not in str(refusal.value)
 
 
 def test_a_run_of_loaders_goes_on_from_its_checkpoint(

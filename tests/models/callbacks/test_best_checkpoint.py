@@ -116,18 +116,6 @@ def test_the_best_epochs_are_those_of_an_unbroken_run(
         assert one == other.replace("unbroken", "second")
 
 
-def test_nothing_of_the_earlier_run_is_removed_from_a_folder_within(
-    fit: Fit, tmp_path: Path
-) -> None:
-    scores = (1.0, 2.0, 3.0)
-    options = {"mode": "max", "filename": "{epoch}"}
-    fit("runs/first", 1, scores, **options)
-    before = contents(tmp_path / "runs/first")
-    fit("runs", 3, scores, earlier="runs/first", **options)
-    assert contents(tmp_path / "runs/first") == before
-    assert weights(tmp_path / "runs") == {"epoch=2.ckpt": 3}
-
-
 @pytest.mark.parametrize(
     "named", ["../precious.ckpt", "notes.txt", "other.ckpt", "..", "../../precious.ckpt"]
 )
@@ -185,13 +173,6 @@ def test_a_run_whose_best_is_gone_starts_anew_and_says_so(
     said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("derain: ")]
     assert len(said) == 1
     assert said[0].startswith(f"derain: warning: {gone}: not found; the best checkpoint is chosen")
-
-
-def test_a_run_that_keeps_fewer_goes_on_with_the_best_of_them(fit: Fit, tmp_path: Path) -> None:
-    scores = (2.0, 3.0, 1.0)
-    fit("first", 2, scores, mode="max", save_top_k=2, filename="{epoch}")
-    fit("second", 3, scores, earlier="first", mode="max", filename="{epoch}")
-    assert weights(tmp_path / "second") == {"epoch=1.ckpt": 2}
 
 
 @pytest.mark.parametrize("first", [True, False])

@@ -83,19 +83,6 @@ def test_labels_are_not_overwritten_by_what_is_found(
     assert label.read_bytes() == b"truth"
 
 
-def test_scans_whose_labels_would_have_one_name_are_refused(
-    make_trainer: MakeTrainer, data: Folder, outdet: Callable[..., OutDet], tmp_path: Path
-) -> None:
-    scene(50).tofile(tmp_path / "a/1.BIN")
-    data.patterns["predict"] = ["a/*.bin", "a/1.*"]  # which finds a/1.bin twice
-    out = tmp_path / "out"
-    with pytest.raises(InputError, match="would both be") as refused:
-        make_trainer(1, callbacks=[PredictionWriter(str(out))]).predict(outdet(), data)
-    assert {refused.value.subject} < {str(tmp_path / "a/1.bin"), str(tmp_path / "a/1.BIN")}
-    assert "--predictions.folder" in refused.value.remedy
-    assert not out.exists()
-
-
 def test_without_labels_predictions_may_lie_beside_the_scans(
     make_trainer: MakeTrainer,
     data: Folder,

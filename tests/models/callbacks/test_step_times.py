@@ -10,20 +10,21 @@ import torch
 from derain.learning.batch import Batch
 from derain.models.callbacks.step_times import StepTimes
 
+PROCESSES = 3
 MODEL: Any = SimpleNamespace(device=torch.device("cpu"))
 
 
 class Training:
     """A training of steps that take as long as they are told to, logged every few steps."""
 
-    def __init__(self, every: int, processes: int = 1) -> None:
+    def __init__(self, every: int) -> None:
         self.now = 100.0
         self.logged: list[tuple[int, dict[str, float]]] = []
         logger = SimpleNamespace(
             log_metrics=lambda values, step: self.logged.append((step, values))
         )
         self.trainer: Any = SimpleNamespace(
-            log_every_n_steps=every, world_size=processes, loggers=[logger], global_step=0
+            log_every_n_steps=every, world_size=PROCESSES, loggers=[logger], global_step=0
         )
         self.times = StepTimes()
 
@@ -49,7 +50,7 @@ def spent(read: float, view: float, wait: float, network: float, speed: float) -
     group = "milliseconds_per_step/"
     means = {"read": read, "view": view, "wait": wait, "network": network}
     values = {group + name: value for name, value in means.items()}
-    return pytest.approx({**values, "speed/scans_per_second": speed})
+    return pytest.approx({**values, "speed/scans_per_second": PROCESSES * speed})
 
 
 def test_means_are_logged_as_often_as_the_trainer_logs(training: Training) -> None:
@@ -74,16 +75,6 @@ def test_neither_validation_nor_what_lies_between_epochs_is_waited_for(training:
     training.times.on_train_epoch_start()
     training.step(1, 1)
     assert training.logged == [(3, spent(read=0, view=0, wait=500, network=1000, speed=2 / 3))]
-
-
-def test_scans_of_all_processes_count(monkeypatch: pytest.MonkeyPatch) -> None:
-    training = Training(every=1, processes=3)
-    monkeypatch.setattr(time, "perf_counter", lambda: training.now)
-    training.times.on_train_start()
-    training.times.on_train_epoch_start()
-    training.step(0, 1)
-    training.step(1, 1, scans=4)
-    assert training.logged == [(2, spent(read=0, view=0, wait=1000, network=1000, speed=12 / 2))]
 
 
 def test_a_training_that_logs_no_steps_says_it_at_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -115,4 +106,4 @@ def test_a_graphics_card_is_waited_for_at_one_step_of_those_that_are_logged(
     network = [values["milliseconds_per_step/network"] for _, values in training.logged]
     assert network == pytest.approx([4000, 4000])
     speed = [values["speed/scans_per_second"] for _, values in training.logged]
-    assert speed == pytest.approx([2 / 8, 2 / 8])
+    assert speed == pytest.approx([PROCESSES * 2 / 8] * 2)

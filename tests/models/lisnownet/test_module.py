@@ -20,12 +20,10 @@ from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
 from derain.learning.batch import Batch, Sample
-from derain.learning.task import agree_on_task
 from derain.models.checkpoint import load_model, save_model
 from derain.models.lisnownet import LiSnowNet
-from derain.models.lisnownet.deployed import cube_roots, rain_logits
 from derain.models.lisnownet.network import LiSnowNetwork, published_key
-from derain.models.lisnownet.selection_rule import FEWEST, SelectionRule
+from derain.models.lisnownet.selection_rule import FEWEST, SelectionRule, cube_roots, rain_logits
 from derain.models.lisnownet.sparsity import sparsity_loss
 from derain.models.measured import MONITOR
 from derain.scan import Scan
@@ -61,15 +59,6 @@ def test_the_spec_says_how_the_network_is_used() -> None:
     assert (spec.data, spec.licence, spec.rain) == ("WADS", WADS.licence, (110,))
 
 
-def test_the_rule_is_fitted_to_the_scans_where_it_is_not_stated() -> None:
-    scans = [Scan.of(scene(3000, seed)) for seed in range(3)]
-    model = LiSnowNet(grid="wads", rule={"ground": -0.5})
-    model.adopt(model.spec_for(WADS, scans))
-    assert model.selection == SelectionRule.fitted({"ground": -0.5}, scans)
-    assert (model.selection.ground, model.selection.full_scale) == (-0.5, 255.0)
-    assert LiSnowNet(grid="wads").rule_for(scans)["ground"] == pytest.approx(-1.4, abs=0.1)
-
-
 def test_the_rule_travels_in_the_checkpoint(image_network: MakeModel, tmp_path: Path) -> None:
     model = image_network(LiSnowNet, rule={"residual": 0.5, "near": 3.0})
     save_model(model, tmp_path / "model.ckpt")
@@ -78,16 +67,6 @@ def test_the_rule_travels_in_the_checkpoint(image_network: MakeModel, tmp_path: 
     assert copy.spec == model.spec
     assert copy.selection == model.selection
     assert (copy.selection.residual, copy.selection.near) == (0.5, 3.0)
-
-
-def test_a_checkpoint_whose_rule_lacks_a_constant_is_refused(
-    image_network: MakeModel, tmp_path: Path
-) -> None:
-    model = image_network(LiSnowNet)
-    del model.hparams["spec"]["rule"]["near"]
-    save_model(model, tmp_path / "model.ckpt")
-    with pytest.raises(InputError, match=r"model\.ckpt: .*checkpoint: rule: near is missing"):
-        load_model(tmp_path / "model.ckpt")
 
 
 @pytest.mark.parametrize(
@@ -142,32 +121,6 @@ def test_a_probability_above_one_half_is_what_the_published_rule_says(rule: Sele
     snow &= returned.numpy()[0, 0]
     assert 0.05 < snow.mean() < 0.95
     np.testing.assert_array_equal(probability > 0.5, snow)
-
-
-@pytest.mark.parametrize(
-    ("change", "pixel", "rain"),
-    [
-        ((1.0, 0.5), (10.0, 0.0, 1.0), False),  # exactly the limit
-        ((1.001, 0.5), (10.0, 0.0, 1.0), True),
-        ((-1.0, -0.6), (10.0, 0.0, 1.0), True),
-        ((-1.0, 0.6), (10.0, 0.0, 1.0), False),
-        ((2.0, 0.6), (10.0, -1.8, 1.0), False),  # on the ground
-        ((2.0, 0.6), (10.0, -1.79, 1.0), True),
-        ((2.0, 0.6), (10.0, 0.0, 2.0), False),  # too bright
-        ((2.0, 0.6), (10.0, 0.0, 1.99), True),
-        ((0.0, 0.0), (2.49, -5.0, 200.0), True),  # near, whatever else
-        ((0.0, 0.0), (2.5, 0.0, 1.0), False),
-    ],
-)
-def test_the_limits_of_the_rule_are_where_they_were_published(
-    change: tuple[float, float], pixel: tuple[float, float, float], rain: bool
-) -> None:
-    rule = SelectionRule(residual=0.125, near=2.5)
-    image = torch.tensor(pixel)[None, :, None, None]
-    seen = torch.zeros(1, 2, 1, 1)
-    returned = torch.ones(1, 1, 1, 1, dtype=torch.bool)
-    logits = rain_logits(image, returned, seen, torch.tensor(change)[None, :, None, None], rule)
-    assert (probability_of_rain(logits.numpy())[0] > 0.5) == rain
 
 
 def test_the_probability_rises_with_the_residual() -> None:
@@ -291,12 +244,6 @@ def write_scenes(folder: Path, validated: int = 300) -> Path:
     return folder
 
 
-def without_labels(folder: Path) -> Path:
-    for label in folder.glob("*.label"):
-        label.unlink()
-    return folder
-
-
 def swap_validation_labels(folder: Path) -> None:
     """Calls rain what is none, and the other way round."""
     label = np.fromfile(folder / "3.label", "<u4")
@@ -365,15 +312,6 @@ def test_validation_labels_measure_and_choose_nothing(
     assert_same(labelled.best["state_dict"], run.best["state_dict"])
 
 
-def test_a_run_needs_no_labels_at_all(
-    train: Callable[..., Run], labelled: Run, tmp_path: Path
-) -> None:
-    run = train(without_labels(write_scenes(tmp_path)))
-    assert run.progress.iou == []
-    assert run.progress.monitor == labelled.progress.monitor
-    assert_same(run.best["state_dict"], labelled.best["state_dict"])
-
-
 def test_a_stated_residual_is_not_fitted(labelled: Run) -> None:
     assert labelled.model.selection.residual == LENIENT["residual"]
 
@@ -397,26 +335,12 @@ class Fitted(NamedTuple):
 
     folder: Path
     run: Run
-    runs_of_the_network: int  # besides training
 
 
 @pytest.fixture(scope="module")
 def fitted(train: Callable[..., Run], tmp_path_factory: pytest.TempPathFactory) -> Fitted:
     folder = write_scenes(tmp_path_factory.mktemp("fitted"), validated=3000)
-    return Fitted(folder, *counted(lambda: train(folder, UNSTATED, SEED)))
-
-
-def counted(fit: Callable[[], Run]) -> tuple[Run, int]:
-    """A training, and how often the network ran besides its steps."""
-    forward, training = LiSnowNetwork.forward, list[bool]()
-
-    def recorded(network: LiSnowNetwork, *seen: Tensor) -> Tensor:
-        training.append(network.training)
-        return forward(network, *seen)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(LiSnowNetwork, "forward", recorded)
-        return fit(), training.count(False)
+    return Fitted(folder, train(folder, UNSTATED, SEED))
 
 
 def best_of(fitted: Fitted) -> tuple[LiSnowNet, RangeImage]:
@@ -458,22 +382,6 @@ def test_the_scores_of_an_epoch_are_those_of_its_checkpoint(fitted: Fitted) -> N
     assert run.progress.iou[run.best["epoch"]] == pytest.approx(iou)
 
 
-def test_the_network_runs_once_on_a_validation_scan_that_the_rule_is_fitted_to(
-    train: Callable[..., Run], fitted: Fitted, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    once = fitted.run
-    assert fitted.runs_of_the_network == 5  # four epochs, and the sanity check before them
-    write_scenes(tmp_path, validated=3000)
-    # As where batches hold other images than the rule is fitted to.
-    monkeypatch.setattr(torch, "equal", lambda *_: False)
-    again, runs = counted(lambda: train(tmp_path, UNSTATED, SEED))
-    monkeypatch.undo()
-    assert runs == 9
-    assert once.progress.loss == again.progress.loss
-    assert once.progress.iou == again.progress.iou
-    assert_same(once.model.state_dict(), again.model.state_dict())
-
-
 def test_measuring_a_model_leaves_its_rule_as_it_is(
     fitted: Fitted, make_trainer: MakeTrainer, tmp_path: Path
 ) -> None:
@@ -484,34 +392,14 @@ def test_measuring_a_model_leaves_its_rule_as_it_is(
     assert model.spec == spec
 
 
-def test_statistics_are_measured_without_labels(small_grid: dict[str, Any], tmp_path: Path) -> None:
-    model = LiSnowNet(small_grid, width=2)
-    agree_on_task(model, scenes_of(without_labels(write_scenes(tmp_path)), "simulated"))
-    points = np.concatenate([scene(300, seed=number) for number in range(3)]).astype(np.float64)
-    distance = np.linalg.norm(points[:, :3], axis=1)
-    np.testing.assert_allclose(model.spec.mean, (distance.mean(), *points[:, 2:].mean(axis=0)))
-    np.testing.assert_allclose(model.spec.std, (distance.std(), *points[:, 2:].std(axis=0)))
-
-
-def test_a_training_that_broke_off_leaves_nothing_to_the_next(
+def test_a_training_fits_the_rule_to_its_own_validation_scans(
     make_trainer: MakeTrainer, small_grid: dict[str, Any], tmp_path: Path
 ) -> None:
-    class Breaking(lightning.Callback):
-        def on_validation_epoch_end(self, trainer: lightning.Trainer, *_: Any) -> None:
-            if not trainer.sanity_checking:
-                raise ArithmeticError
-
-    for number in range(2):
-        scene(300, seed=number).tofile(tmp_path / f"{number}.bin")
-    model = LiSnowNet(small_grid, width=2)
-    first, second = (
-        Folder(str(tmp_path), "wads", train=[f"{number}.bin"], validation=[f"{number}.bin"])
-        for number in range(2)
-    )
-    with pytest.raises(ArithmeticError):
-        make_trainer(epochs=1, callbacks=[Breaking()]).fit(model, first)
-    seen: list[str] = []
-    look = model._seen
-    model._seen = lambda scan: seen.append(Path(scan.name).name) or look(scan)
-    make_trainer(epochs=2).fit(model, second)
-    assert seen == ["1.bin"]
+    model, seen = LiSnowNet(small_grid, width=2), list[str]()
+    look = model._image_of
+    model._image_of = lambda scan: seen.append(Path(scan.name).name) or look(scan)
+    for name in ("0.bin", "1.bin"):
+        scene(300).tofile(tmp_path / name)
+        data = Folder(str(tmp_path), "wads", train=[name], validation=[name])
+        make_trainer(epochs=2).fit(model, data)
+    assert seen == ["0.bin", "1.bin"]

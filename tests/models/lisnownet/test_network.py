@@ -7,10 +7,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from derain.errors import InputError
-from derain.models.lisnownet.network import LiSnowNetwork, published_key
+from derain.models.lisnownet.network import (
+    LiSnowNetwork,
+    fill_holes,
+    haar,
+    inverse_haar,
+    published_key,
+)
 from derain.models.lisnownet.sparsity import sparsity_loss
 
 from ..oracle_weights import recipe_weights
@@ -176,16 +186,160 @@ def test_an_image_without_variation_leaves_the_others_their_gradient() -> None:
     torch.testing.assert_close(gradients[2], gradients[0], rtol=1e-4, atol=1e-5)
 
 
-def test_one_pixel_at_the_smallest_size_can_be_trained_on() -> None:
-    network, (image, valid) = small().train(), scene(16, 16)
-    denoised = network(image, valid)
-    sparsity_loss(denoised, image, valid, alpha=5, beta=0.5).total.backward()
-    assert denoised.isfinite().all()
-    assert all(parameter.grad.isfinite().all() for parameter in network.parameters())
-
-
 def test_the_gradient_reaches_every_parameter() -> None:
     network, (image, valid) = small(), scene(64, 64, scans=2)
     sparsity_loss(network(image, valid), image, valid, alpha=5, beta=0.5).total.backward()
     for name, parameter in network.named_parameters():
         assert parameter.grad.any(), name
+
+
+@st.composite
+def images(draw: st.DrawFn) -> Tensor:
+    scans, channels, rows, columns = (draw(st.integers(1, top)) for top in (2, 3, 5, 5))
+    generator = torch.Generator().manual_seed(draw(st.integers(0, 2**32)))
+    shape = (scans, channels, 2 * rows, 2 * columns)
+    return torch.randn(shape, generator=generator, dtype=torch.float64)
+
+
+@given(images())
+def test_each_is_the_inverse_of_the_other(image: Tensor) -> None:
+    bands = haar(image)
+    torch.testing.assert_close(inverse_haar(bands), image)
+    torch.testing.assert_close(haar(inverse_haar(bands)), bands)
+
+
+@given(images())
+def test_energy_and_angles_are_kept(image: Tensor) -> None:
+    other = image.flip(-1).roll(1, dims=-2)
+    torch.testing.assert_close((haar(image) * haar(other)).sum(), (image * other).sum())
+    torch.testing.assert_close(haar(image).norm(), image.norm())
+
+
+def test_each_block_is_multiplied_by_the_basis() -> None:
+    basis = np.array([[1, 1, 1, 1], [1, 1, -1, -1], [1, -1, 1, -1], [1, -1, -1, 1]]) / 2
+    image = torch.randn(2, 3, 6, 10, dtype=torch.float64)
+    bands = haar(image).unflatten(1, (4, 3)).numpy()
+    for row, column in np.ndindex(3, 5):
+        block = image[..., 2 * row : 2 * row + 2, 2 * column : 2 * column + 2].flatten(-2).numpy()
+        expected = np.einsum("bp,scp->sbc", basis, block)
+        np.testing.assert_allclose(bands[..., row, column], expected)
+
+
+def test_bands_stand_one_after_the_other_with_all_channels_each() -> None:
+    left_right = torch.tensor([[1.0, -1.0], [1.0, -1.0]])
+    image = torch.stack([torch.ones(2, 2), left_right])[None]
+    expected = torch.zeros(8)
+    expected[0], expected[5] = 2, 2  # average of channel 0, left to right of channel 1
+    torch.testing.assert_close(haar(image).flatten(), expected)
+
+
+def holed(height: int, width: int, share: float, seed: int = 0) -> tuple[Tensor, Tensor]:
+    """A random image of two channels and which of its pixels are valid."""
+    generator = torch.Generator().manual_seed(seed)
+    image = 4 * torch.rand(1, 2, height, width, generator=generator, dtype=torch.float64)
+    return image, torch.rand(1, 1, height, width, generator=generator) < share
+
+
+def neighbourhoods(image: NDArray[np.float64], size: int) -> NDArray[np.float64]:
+    """(2, H, W, size, size), edges continued by NumPy."""
+    margin = size // 2
+    image = np.pad(image, ((0, 0), (0, 0), (margin, margin)), mode="wrap")
+    image = np.pad(image, ((0, 0), (margin, margin), (0, 0)), mode="reflect")
+    return sliding_window_view(image, (size, size), axis=(1, 2))
+
+
+def as_published(image: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The published formula, where empty pixels are -1; NaN where it is 0 / 0."""
+    valid: NDArray[np.bool_] = np.any(image >= 0, axis=0)
+    dense = np.where(valid, image, neighbourhoods(image, 3).max(axis=(3, 4)))
+    known: NDArray[np.bool_] = np.any(dense >= 0, axis=0)
+    for channel, row in np.ndindex(dense.shape[:2]):
+        values = dense[channel, row, known[row]]
+        level = values.mean() + values.std() if len(values) else np.nan
+        dense[channel, row, ~known[row]] = level
+    around = neighbourhoods(dense, 3).sum(axis=(3, 4)) - dense
+    sharpened = dense + np.maximum(around / 8 - dense, 0)
+    return np.where(valid, image, neighbourhoods(sharpened, 5).mean(axis=(3, 4)))
+
+
+def test_the_filled_image_is_the_published_one(shared: Path) -> None:
+    oracle = np.load(shared / "oracles" / "lisnownet.npz")
+    image = torch.from_numpy(oracle["x"])
+    filled = fill_holes(image, (image >= 0).any(dim=1, keepdim=True))
+    np.testing.assert_allclose(filled, oracle["filled"], rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize(("height", "width"), [(3, 2), (4, 7), (16, 64)])
+@pytest.mark.parametrize("share", [0.9, 0.4, 0.15])
+def test_holes_are_filled_by_the_published_formula(height: int, width: int, share: float) -> None:
+    image, valid = holed(height, width, share)
+    valid[..., ::2, 0] = True  # a value in every row after the first step
+    expected = as_published(torch.where(valid, image, -1)[0].numpy())
+    np.testing.assert_allclose(fill_holes(image, valid)[0], expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("rubbish", [-1.0, 0.0, 1e30, np.nan, np.inf, -np.inf])
+def test_what_empty_pixels_hold_does_not_matter(rubbish: float) -> None:
+    image, valid = holed(16, 32, 0.3)
+    filled = fill_holes(torch.where(valid, image, rubbish), valid)
+    assert torch.equal(filled, fill_holes(image, valid))
+
+
+def test_a_row_far_from_any_value_takes_the_level_of_the_whole_image() -> None:
+    image, valid = holed(12, 16, 1.0)
+    valid[..., 2:11, :] = False
+    rows = [0, 1, 2, 10, 11]  # those with values once holes beside valid pixels are filled
+    grown = image[0].numpy().copy()
+    grown[:, [2, 10]] = neighbourhoods(torch.where(valid, image, -1)[0].numpy(), 3).max(
+        axis=(3, 4)
+    )[:, [2, 10]]
+    values = grown[:, rows].reshape(2, -1)
+    level = values.mean(axis=1) + values.std(axis=1)
+    filled = fill_holes(image, valid)[0, :, 6].numpy()
+    np.testing.assert_allclose(filled, np.repeat(level[:, None], 16, axis=1))
+
+
+@pytest.mark.parametrize("size", [(1, 1), (2, 3), (16, 32)])
+def test_an_image_without_a_return_is_zero(size: tuple[int, int]) -> None:
+    image, valid = holed(*size, share=0)
+    assert torch.equal(fill_holes(image, valid), torch.zeros_like(image))
+
+
+def test_a_single_return_fills_the_whole_image() -> None:
+    image, valid = holed(16, 32, 0.0)
+    valid[..., 5, 0] = True
+    expected = image[..., 5:6, 0:1].expand_as(image)
+    torch.testing.assert_close(fill_holes(image, valid), expected)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.3, 1.0])
+@pytest.mark.parametrize("value", [None, 0.0, 2.7])
+def test_gradients_are_finite(share: float, value: float | None) -> None:
+    image, valid = holed(16, 32, share)
+    image = image.float() if value is None else torch.full((1, 2, 16, 32), value)
+    valid[..., 3:10, :] = False
+    image.requires_grad_()
+    fill_holes(image, valid).square().sum().backward()
+    assert image.grad is not None
+    assert image.grad.isfinite().all()
+
+
+@pytest.mark.parametrize("largest", [1e-38, 1e4, 3e38])
+def test_ranges_of_every_size_stay_finite(largest: float) -> None:
+    image, valid = holed(16, 32, 0.3)
+    image = (image.float() / 4 * largest) ** (1 / 3)
+    image.requires_grad_()
+    filled = fill_holes(image, valid)
+    filled.sum().backward()
+    assert filled.isfinite().all()
+    assert image.grad is not None
+    assert image.grad.isfinite().all()
+
+
+def test_autocast_takes_nothing_from_the_precision_of_what_is_filled() -> None:
+    image, valid = holed(16, 32, 0.3)
+    image = image.float()
+    with torch.autocast("cpu", dtype=torch.bfloat16):
+        filled = fill_holes(image, valid)
+    assert torch.equal(filled, fill_holes(image, valid))
+    assert fill_holes(image.bfloat16(), valid).dtype == torch.float32

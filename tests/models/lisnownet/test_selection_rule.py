@@ -1,6 +1,5 @@
 """The selection rule is fitted to scans alone, and is the published one where nothing is known."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -43,12 +42,6 @@ def test_without_scans_the_rule_is_the_published_one() -> None:
         **{"residual": 0.012, "ground": -1.8, "intensity": 2 / 255, "near": 0.0},
         "full_scale": 255.0,
     }
-
-
-def test_a_rule_survives_json() -> None:
-    rule = SelectionRule(0.1, 0.2, 0.3, 0.4, 0.5)
-    entry = Entry("model", "rule", json.loads(json.dumps(rule.as_dict())))
-    assert SelectionRule.of(entry) == rule
 
 
 WHOLE = SelectionRule().as_dict()
@@ -123,15 +116,6 @@ def test_the_ground_is_that_of_the_median_scan() -> None:
     scans = [on_rings((10, height)) for height in (-2.0, -7.0, -2.1, 5.0, -2.2)]
     assert SelectionRule.fitted({}, scans).ground == pytest.approx(-2.1 + 0.4)
     assert SelectionRule.fitted({}, [*scans, HARD_CASES["empty"]]).ground == pytest.approx(-1.7)
-
-
-@given(st.floats(-3, 3), st.permutations(range(3)))
-def test_a_sensor_mounted_higher_sees_the_ground_lower(raised: float, order: list[int]) -> None:
-    scans = [Scan.of(scene(300, seed)) for seed in range(3)]
-    shift = np.array([0, 0, raised, 0], np.float32)
-    higher = [Scan.of(scene(300, seed) - shift) for seed in order]
-    before, after = SelectionRule.fitted({}, scans), SelectionRule.fitted({}, higher)
-    assert after.ground == pytest.approx(before.ground - raised, abs=1e-5)
 
 
 def test_what_is_stated_is_not_fitted() -> None:

@@ -50,19 +50,6 @@ def test_the_spec_says_how_the_network_is_used() -> None:
     assert (spec.classes, spec.rain) == (WADS.classes, (110,))
 
 
-def test_fewer_channels_will_do(image_network: MakeModel, image_sample: MakeSample) -> None:
-    model = image_network(SalsaNext, channels=("intensity", "range"))
-    assert model.spec.mean == (WADS.mean[3], 26.6)
-    one = image_sample(model, scene())
-    assert Batch.of([one]).inputs["image"].shape == (1, 2, 18, 60)
-    assert model(**Batch.of([one]).inputs).shape == (18 * 60, 2)
-
-
-def test_a_channel_that_there_is_not_is_refused() -> None:
-    with pytest.raises(InputError, match="no statistics of colour"):
-        SalsaNext(grid="wads", channels=("range", "colour")).spec_for(WADS)
-
-
 @pytest.mark.parametrize("prefix", ["", "module."])
 @torch.no_grad()
 def test_published_weights_give_the_logits_of_the_network_on_normalised_images(
@@ -177,21 +164,6 @@ def test_both_losses_are_defined_for_one_kind_of_pixel(of: int, published_loss: 
     assert loss.isfinite()
     assert logits.grad is not None
     assert logits.grad.isfinite().all()
-
-
-def test_the_loss_of_a_batch_is_that_of_its_pixels(
-    image_network: MakeModel, image_sample: MakeSample
-) -> None:
-    model = image_network(SalsaNext)
-    batch = Batch.of([image_sample(model, scene(3000, seed)) for seed in range(2)])
-    losses, logits = model.losses(batch)
-    torch.testing.assert_close(logits, model(**batch.inputs))
-    expected = model.segmentation_loss(logits, batch.target)
-    assert losses == {
-        "loss": expected.total,
-        "cross_entropy": expected.cross_entropy,
-        "lovasz": expected.lovasz,
-    }
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""SalsaNext's network computes what was published, for images of any size."""
+"""SalsaNext computes what was published; it and its variant, for images of any size."""
 
 import json
 from collections import Counter
@@ -10,10 +10,13 @@ import onnxruntime
 import pytest
 import torch
 from torch import Tensor, nn
+from torch.nn.functional import cross_entropy
 
 from derain.errors import InputError
-from derain.models.salsanext.network import PUBLISHED_KEYS, PixelBatchNorm, SalsaNextNetwork
+from derain.models.salsanext.network import PUBLISHED_KEYS, SalsaNextNetwork, SalsaNextPlan
+from derain.models.salsanext_lite import SalsaNextLiteNetwork
 
+from ..conftest import randomise
 from ..oracle_weights import recipe_weights
 
 
@@ -29,9 +32,9 @@ def small(channels: int = 5, width: int = 4, classes: int = 2, seed: int = 0) ->
     return SalsaNextNetwork.from_published(recipe_weights(shapes, seed)).eval()
 
 
-def image(height: int, width: int, channels: int = 5) -> Tensor:
+def image(height: int, width: int, channels: int = 5, scans: int = 1) -> Tensor:
     generator = torch.Generator().manual_seed(height * 1000 + width)
-    return torch.randn(1, channels, height, width, generator=generator)
+    return torch.randn(scans, channels, height, width, generator=generator)
 
 
 @torch.no_grad()
@@ -91,25 +94,6 @@ def test_a_width_that_cannot_be_halved_is_refused(width: int) -> None:
         SalsaNextNetwork(width=width)
 
 
-def test_a_single_pixel_is_normalised_by_the_running_statistics() -> None:
-    norm, features = PixelBatchNorm(3), image(1, 1, channels=3)
-    norm.running_mean.copy_(torch.tensor([1.0, -2.0, 0.5]))
-    norm.running_var.copy_(torch.tensor([4.0, 0.25, 1.0]))
-    kept = {name: buffer.clone() for name, buffer in norm.named_buffers()}
-    normalised = norm.train()(features)
-    torch.testing.assert_close(normalised, norm.eval()(features))
-    for name, buffer in norm.named_buffers():
-        torch.testing.assert_close(buffer, kept[name], rtol=0, atol=0)
-
-
-@pytest.mark.parametrize("shape", [(2, 3, 1, 1), (1, 3, 1, 2), (2, 3, 4, 5)])
-def test_more_pixels_are_normalised_as_by_pytorch(shape: tuple[int, ...]) -> None:
-    norm, reference, features = PixelBatchNorm(3), nn.BatchNorm2d(3), torch.randn(shape)
-    torch.testing.assert_close(norm(features), reference(features))
-    for buffer, expected in zip(norm.buffers(), reference.buffers(), strict=True):
-        torch.testing.assert_close(buffer, expected)
-
-
 @pytest.mark.filterwarnings("ignore")  # the exporter's own parts warn of each other
 def test_the_exported_network_spends_nothing_on_sizes_that_fit(tmp_path: Path) -> None:
     network, seen, path = small(), image(16, 32), tmp_path / "salsanext.onnx"
@@ -129,3 +113,78 @@ def test_the_exported_network_spends_nothing_on_sizes_that_fit(tmp_path: Path) -
     operators = Counter(node.op_type for node in onnx.load(path).graph.node)
     assert operators["Conv"] == 51
     assert not operators.keys() & {"Pad", "Slice"}
+
+
+both = pytest.mark.parametrize("kind", [SalsaNextNetwork, SalsaNextLiteNetwork])
+
+
+def random_one(kind: type[SalsaNextPlan], width: int = 4) -> SalsaNextPlan:
+    """A network with weights and statistics that leave no BatchNorm without effect."""
+    network = kind(channels=5, width=width)
+    randomise(network, seed=0)
+    return network.eval()
+
+
+def step(network: nn.Module, batch: Tensor) -> None:
+    """Computes the gradients of a training step, all of which are finite."""
+    loss = cross_entropy(network.train()(batch), (batch[:, 0] > 0).long())
+    loss.backward()
+    assert loss.isfinite()
+    for name, parameter in network.named_parameters():
+        assert parameter.grad is not None
+        assert parameter.grad.isfinite().all(), name
+
+
+@both
+@pytest.mark.parametrize(("height", "width"), [(1, 1), (2, 17), (15, 16), (20, 37), (32, 48)])
+@torch.no_grad()
+def test_an_image_of_any_size_counts_as_continued_by_empty_pixels(
+    kind: type[SalsaNextPlan], height: int, width: int
+) -> None:
+    network, seen = random_one(kind), image(height, width)
+    padded = torch.zeros(1, 5, -(-height // 16) * 16, -(-width // 16) * 16)
+    padded[..., :height, :width] = seen
+    logits = network(seen)
+    assert logits.shape == (1, 2, height, width)
+    torch.testing.assert_close(logits, network(padded)[..., :height, :width], rtol=0, atol=0)
+
+
+@both
+@pytest.mark.parametrize(
+    ("scans", "height", "width"), [(1, 1, 1), (1, 16, 16), (2, 16, 16), (1, 20, 37)]
+)
+def test_a_training_step_on_small_images_is_finite(
+    kind: type[SalsaNextPlan], scans: int, height: int, width: int
+) -> None:
+    step(random_one(kind), image(height, width, scans=scans))
+
+
+@both
+def test_the_gradient_reaches_every_parameter(kind: type[SalsaNextPlan]) -> None:
+    network = random_one(kind, width=8)
+    # At the bottleneck 3×3 pixels: in fewer, some taps of its kernels only ever see the padding.
+    step(network, image(48, 48, scans=2))
+    assert all(parameter.grad.any() for parameter in network.parameters())
+
+
+@pytest.mark.parametrize(
+    ("kind", "drops"),
+    # On the way down; on the way up before and after the layers, and, in SalsaNext, the joint.
+    [(SalsaNextNetwork, 4), (SalsaNextLiteNetwork, 3)],
+)
+def test_features_are_dropped_everywhere_but_at_full_resolution(
+    kind: type[SalsaNextPlan], drops: int
+) -> None:
+    network = kind(width=4, dropout=0.3).train()
+    dropped: list[tuple[int, float]] = []
+
+    def record(layer: nn.Dropout2d, inputs: tuple[Tensor], _: Tensor) -> None:
+        dropped.append((inputs[0].shape[-1], layer.p))
+
+    for layer in network.modules():
+        if isinstance(layer, nn.Dropout2d):
+            layer.register_forward_hook(record)
+    network(image(64, 64))
+    expected = {(32, 0.3): drops, (16, 0.3): drops, (8, 0.3): drops, (4, 0.3): 1}
+    assert Counter(drop for drop in dropped if drop[1] > 0) == expected
+    assert {size for size, rate in dropped if rate == 0} == {64}

@@ -1,11 +1,13 @@
-"""Padding is that of NumPy, and so is its gradient."""
+"""Layers: padding is that of NumPy, BatchNorm that of PyTorch, and so are their gradients."""
 
 import numpy as np
 import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
+from torch import Tensor, nn
 
+from derain.models.layers.batch_norm import PixelBatchNorm
 from derain.models.layers.padding import pad_around, pad_to_multiple
 
 SIZES = [(1, 1, 1), (2, 3, 2), (5, 4, 1), (1, 4, 3), (3, 1, 4), (6, 7, 2)]
@@ -61,3 +63,19 @@ def test_an_image_that_fits_comes_back_as_it_is() -> None:
     image = torch.zeros(1, 2, 32, 48)
     assert pad_to_multiple(image, 16, value=-1.0) is image
     assert pad_to_multiple(image[..., :3].bfloat16(), 4, 0.0).dtype is torch.bfloat16
+
+
+def gradients(norm: nn.BatchNorm2d, image: Tensor) -> list[Tensor]:
+    """Of half of the channels of a concatenation, so that the gradient has gaps."""
+    joined = torch.cat([norm(image), image], dim=1)
+    return list(torch.autograd.grad(joined.sin().sum(), [image, *norm.parameters()]))
+
+
+@pytest.mark.parametrize("memory_format", [torch.contiguous_format, torch.channels_last], ids=str)
+def test_the_gradient_is_pytorchs(memory_format: torch.memory_format) -> None:
+    image = torch.randn(2, 3, 5, 7, dtype=torch.double, generator=torch.Generator().manual_seed(0))
+    expected = gradients(nn.BatchNorm2d(3).double(), image.clone().requires_grad_())
+    seen = image.contiguous(memory_format=memory_format).requires_grad_()
+    found = gradients(PixelBatchNorm(3).double(), seen)
+    for one, other in zip(found, expected, strict=True):
+        torch.testing.assert_close(one, other)

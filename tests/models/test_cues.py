@@ -1,12 +1,14 @@
 """Cues: what the network makes of a scan's brightness, in whatever unit, order and direction."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import lightning
 import numpy as np
 import pytest
 import torch
+from hypothesis import given
+from hypothesis import strategies as st
+from torch import Tensor
 from torch.nn import functional
 
 from derain.datamodules.in_memory import InMemory
@@ -16,11 +18,13 @@ from derain.evaluation.hard_cases import scene
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.learning.batch import Batch, Sample
-from derain.models.checkpoint import load_model, save_model
 from derain.models.cues import CueFusion
-from derain.models.cues.beams import in_steps
+from derain.models.cues.geometry import in_steps
+from derain.models.cues.network import LARGEST_LOG_ODDS, calibrated
 from derain.models.outdet import OutDet
 from derain.scan import Scan
+from derain.views.intensity_rank import INTENSITY_RANKS
+from derain.views.isolated_points import SHELLS
 
 
 def labelled(seed: int, drops: int = 300, gain: float = 1.0) -> Scan:
@@ -90,15 +94,6 @@ def test_scans_of_a_batch_say_nothing_to_each_other(trained: CueFusion) -> None:
     torch.testing.assert_close(together, apart)
 
 
-def test_a_checkpoint_gives_the_same(trained: CueFusion, tmp_path: Path) -> None:
-    save_model(trained, tmp_path / "model.ckpt")
-    again = load_model(tmp_path / "model.ckpt")
-    assert again.spec == trained.spec
-    assert isinstance(again, CueFusion)
-    for own, other in zip(trained.state_dict().values(), again.state_dict().values(), strict=True):
-        torch.testing.assert_close(own, other, rtol=0, atol=0)
-
-
 def test_it_needs_its_neighbours_and_a_start_of_its_kind() -> None:
     with pytest.raises(InputError, match="neighbours: 8 are too few"):
         CueFusion(neighbours=8)
@@ -140,3 +135,62 @@ def test_farther_aside_and_up_are_measured_along_the_beam_and_across_it() -> Non
     torch.testing.assert_close(aside.sinh() * length, places[1:, 1])
     torch.testing.assert_close(risen.sinh() * length, places[1:, 2])
     assert far[0] == 0
+
+
+def drawn(seed: int, points: int = 500) -> tuple[Tensor, Tensor, Tensor]:
+    """Points by shell and rank, the cell of each of them, and how probably it is rain."""
+    generator = np.random.default_rng(seed)
+    cell = torch.tensor(generator.integers(0, SHELLS * INTENSITY_RANKS, points))
+    return counted(cell), cell, torch.tensor(generator.uniform(0, 1, points))
+
+
+def counted(cell: Tensor) -> Tensor:
+    counts = torch.bincount(cell, minlength=SHELLS * INTENSITY_RANKS)
+    return counts.reshape(SHELLS, INTENSITY_RANKS).float()
+
+
+def smoothed(counts: np.ndarray) -> np.ndarray:
+    for axis in (0, 1):
+        padding = [(1, 1) if axis == number else (0, 0) for number in (0, 1)]
+        wide = np.pad(counts, padding, mode="edge")
+        take = [wide.take(range(n, n + counts.shape[axis]), axis) for n in range(3)]
+        counts = 0.25 * take[0] + 0.5 * take[1] + 0.25 * take[2]
+    return counts
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_log_odds_are_those_of_smoothed_counts(seed: int) -> None:
+    counts, cell, probability = drawn(seed)
+    rain, rest = np.zeros((2, SHELLS, INTENSITY_RANKS))
+    for number, p in zip(cell.tolist(), probability.tolist(), strict=True):
+        place = divmod(number, INTENSITY_RANKS)
+        rain[place] += p
+        rest[place] += 1 - p
+    rain, rest = smoothed(rain), smoothed(rest)
+    both = rain + rest + 1e-12
+    usual = 100 * both / both.sum(1, keepdims=True)
+    in_rain = (rain + usual) / (rain.sum(1, keepdims=True) + 100)
+    in_rest = (rest + usual) / (rest.sum(1, keepdims=True) + 100)
+    expected = np.log(in_rain / in_rest).clip(-LARGEST_LOG_ODDS, LARGEST_LOG_ODDS)
+    found = calibrated(counts, cell, probability)
+    log_odds = found.log_odds.reshape(SHELLS, INTENSITY_RANKS).numpy()
+    occurring = both > 0.1
+    np.testing.assert_allclose(log_odds[occurring], expected[occurring], atol=1e-4)
+    np.testing.assert_allclose(found.rain, rain.sum(1), rtol=1e-9)
+
+
+def test_where_all_are_alike_or_none_is_rain_brightness_means_nothing() -> None:
+    counts, cell, probability = drawn(0)
+    darkest = cell - cell % INTENSITY_RANKS
+    alike = calibrated(counted(darkest), darkest, probability)
+    dry = calibrated(counts, cell, torch.zeros_like(probability))
+    assert alike.log_odds[darkest].abs().max() < 1e-6
+    assert dry.log_odds[cell].abs().max() < 1e-6
+
+
+def test_points_that_are_not_asked_about_count_as_no_rain() -> None:
+    counts, cell, probability = drawn(1)
+    asked = torch.arange(len(cell)) % 3 == 0
+    some = calibrated(counts, cell[asked], probability[asked])
+    every = calibrated(counts, cell, probability * asked)
+    torch.testing.assert_close(some.log_odds, every.log_odds)
