@@ -79,8 +79,8 @@ class Geometry(nn.Module):
         features = active(self.neighbourhood(torch.cat([around, far[None]])))
         features = features + self._context(features, far, counts.sum(dim=1))
         opinions = torch.cat([active(self.to_opinion(features)).T, self.of_crowded])
-        heard = functional.embedding(others.T, opinions).flatten(1).T
-        features = features + active(self.from_opinions.weight @ heard + self.opinions(features))
+        heard = functional.embedding(others.T, opinions).flatten(1)
+        features = features + active(self.from_opinions(heard).T + self.opinions(features))
         return features, self.head(features)[0]
 
     def _context(self, features: Tensor, far: Tensor, points: Tensor) -> Tensor:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor, nn
 
-from derain.models.cues.beams import in_steps, taken
+from derain.models.cues.beams import in_steps, taken, taken_of_each
 from derain.models.cues.brightness import calibrated
 from derain.models.cues.geometry import Geometry
 from derain.models.layers.across_features import AcrossFeatures
@@ -121,8 +121,7 @@ class CueNetwork(nn.Module):
         features, rain = self.geometry(seen, far, others, counts)
         doubtful = torch.nonzero(rain > DOUBTFUL)[:, 0]
         cues = Cues(far, cell, distances, neighbours, others, counts, doubtful)
-        # Transposed, each point's features are copied in one piece: faster in onnxruntime.
-        answers, features = [rain], features.T.index_select(0, doubtful).T
+        answers, features = [rain], taken_of_each(features, doubtful)
         for fusion in self.rounds:
             with torch.no_grad():
                 given = cues.around(answers[-1])
@@ -175,16 +174,15 @@ class Cues:
         doubtful: Tensor,
     ) -> None:
         self._counts, self._doubtful = counts, doubtful
-        self._cell_of_isolated = cell.index_select(0, neighbours[0])
+        self._cell_of_isolated = taken(cell, neighbours[0])
         self._cell = taken(self._cell_of_isolated, doubtful)
         around = slice(1, APART[-1] + 1)
-        self._others = others[around].index_select(1, doubtful)
-        self._cell_of_others = taken(cell, neighbours[around].index_select(1, doubtful))
+        self._others = taken_of_each(others[around], doubtful)
+        self._cell_of_others = taken(cell, taken_of_each(neighbours[around], doubtful))
         # Shifted and scaled, here and below, so that all numbers are of the order of 1.
         far = taken(far, doubtful)
-        apart = distances[APART, :].index_select(1, doubtful) / (USUAL_RANGE * far.exp()).clamp_min(
-            NEAREST_POINT
-        )
+        range_ = (USUAL_RANGE * far.exp()).clamp_min(NEAREST_POINT)
+        apart = taken_of_each(distances[APART, :], doubtful) / range_
         rank = (self._cell % INTENSITY_RANKS).to(far.dtype) / (INTENSITY_RANKS - 1)
         self._places = torch.cat(
             [(far + 0.3)[None], torch.log(apart + NEAREST_APART) + 4, rank[None]]
