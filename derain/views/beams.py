@@ -37,16 +37,19 @@ def beam_step(
     """
     if len(xyz) <= STEP_NEIGHBOURS:
         return USUAL_STEP
-    own = _directions(xyz.take(rows, axis=0))[:, None]
-    others = _directions(xyz.take(neighbours[:, 1:].ravel(), axis=0)).reshape(len(rows), -1, 3)
-    chords = np.square(others - own).sum(axis=2).max(axis=1)
+    own = _directions(xyz.take(rows, axis=0))
+    chords = np.zeros(len(rows))
+    for column in neighbours[:, 1:].T:
+        other = _directions(xyz.take(column, axis=0))
+        chords = np.maximum(chords, np.square(other - own).sum(axis=0))
     return max(float(np.sqrt(np.median(chords))), FINEST_STEP)
 
 
 def _directions(xyz: NDArray[np.float32]) -> NDArray[np.float64]:
-    wide = xyz.astype(np.float64)
-    length = np.maximum(np.sqrt(np.square(wide).sum(axis=1)), NEAREST_POINT)
-    directions: NDArray[np.float64] = wide / length[:, None]
+    """Unit vectors to some points, float64 (3, Q)."""
+    axes = np.array(xyz.T, np.float64, order="C")
+    length = np.maximum(np.sqrt(np.square(axes).sum(axis=0)), NEAREST_POINT)
+    directions: NDArray[np.float64] = axes / length
     return directions
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from derain.files.documents import Entry
 from derain.scan import Scan
 from derain.views.beams import SAMPLED, STEP_NEIGHBOURS, beam_step, crowding
-from derain.views.intensity_rank import INTENSITY_RANKS, intensity_rank
+from derain.views.intensity_rank import INTENSITY_RANKS, edges_reached, intensity_rank
 from derain.views.merged_points import are_one_return, merged_points
 from derain.views.morton import distinct_rows
 from derain.views.neighbour_search import NeighbourSearch
@@ -167,8 +167,7 @@ class IsolatedPointView(View):
 
     def __call__(self, scan: Scan) -> IsolatedPoints:
         """Views a scan."""
-        first, inverse, search, step = self._returns(scan)
-        xyz = scan.xyz.take(first, axis=0)
+        first, inverse, xyz, search, step = self._returns(scan)
         isolated = np.flatnonzero(crowding(xyz, step) <= MOST_CROWDED)
         neighbours, distances = search(self.neighbours, isolated)
         cell = _cells(xyz, intensity_rank(scan)[first])
@@ -186,31 +185,32 @@ class IsolatedPointView(View):
 
     def _returns(
         self, scan: Scan
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NeighbourSearch, float]:
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32], NeighbourSearch, float]:
         """The distinct returns of a scan, and the step between its beams.
 
         Returns:
-            ``first`` and ``inverse`` as of :class:`IsolatedPoints`; what finds neighbours among
-            them; and radians.
+            ``first``, ``inverse`` and ``points`` as of :class:`IsolatedPoints`; what finds
+            neighbours among these; and radians.
         """
         first, inverse = distinct_rows(scan)
-        search, step, doubled = self._searched(scan, first)
+        # take is four times faster than indexing for rows of three numbers.
+        xyz = scan.xyz.take(first, axis=0)
+        search, step, doubled = self._searched(xyz, first)
         if doubled:
-            xyz = scan.xyz.take(first, axis=0)
             kept, point = merged_points(xyz, first, *search(1 + STEP_NEIGHBOURS))
             first, inverse = first[kept], np.append(point, -1)[inverse]
-            search, step, _ = self._searched(scan, first)
-        return first, inverse, search, step
+            xyz = xyz.take(kept, axis=0)
+            search, step, _ = self._searched(xyz, first)
+        return first, inverse, xyz, search, step
 
     def _searched(
-        self, scan: Scan, first: NDArray[np.int64]
+        self, xyz: NDArray[np.float32], first: NDArray[np.int64]
     ) -> tuple[NeighbourSearch, float, bool]:
         """What finds neighbours, the step, and whether some returns are written more than once.
 
         The latter two are those of a sample: where none of thousands is written twice, the few that
         may be make no difference.
         """
-        xyz = scan.xyz.take(first, axis=0)
         search = NeighbourSearch(xyz, rank=first, threads=self.threads)
         some = np.unique(np.arange(SAMPLED) * len(first) // SAMPLED)[: len(first)]
         neighbours, distances = search(1 + STEP_NEIGHBOURS, some)
@@ -227,6 +227,5 @@ def _cells(xyz: NDArray[np.float32], rank: NDArray[np.int64]) -> NDArray[np.int6
     """
     x, y, z = np.ascontiguousarray(xyz.T)
     squared = x * x + y * y + z * z
-    shell = np.searchsorted(np.square(SHELL_EDGES).astype(np.float32), squared, side="right")
-    cell: NDArray[np.int64] = shell * INTENSITY_RANKS + rank
-    return cell
+    shell = edges_reached(squared, np.square(SHELL_EDGES).astype(np.float32))
+    return shell * INTENSITY_RANKS + rank
