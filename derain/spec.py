@@ -12,14 +12,13 @@ from derain.scan import LARGEST_ID, Scan
 from derain.views.candidates import Candidates, bounded_channels, candidates_at
 from derain.views.channels import MOST_CHANNELS
 from derain.views.one_viewpoint import viewpoint_issues
-from derain.views.registry import VIEWS
 from derain.views.scan_issues import (
     ScanIssue,
     intensity_unlike_training,
     missing_channels,
     missing_intensity,
 )
-from derain.views.view import View
+from derain.views.view import VIEWS, View
 
 SCHEMA = 1
 

@@ -1,7 +1,26 @@
-"""Where the sensor saw a return: azimuth and inclination."""
+"""Where a sensor saw returns, which of them in one direction, and whether that is chance.
+
+A sensor of two returns gives both the direction of their ray, to the last digits of the numbers.
+Between these and the neighbouring rays nothing lies: where directions agree by chance, as those of
+a rosette, of several sensors or of a shaken one do, there are about as many a little farther apart.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
+
+# Returns of one ray differ by at most this much in direction, degrees: by the rounding of
+# coordinates to float32, or to millimetres. Of these the largest counts at which the returns of
+# one ray stand out, which is where neighbouring rays are out of reach.
+TOLERANCES = (0.05, 0.02, 0.01, 0.005, 0.002, 0.001)
+
+# More returns in one direction are not of one ray: sensors tell up to three apart.
+MOST_RETURNS = 3
+
+# Directions agree by chance in the nearer half of a tolerance at most as often as in the farther.
+# So many pairs, and so many times as many as in the farther half, are none: of 24 pairs 20 or more
+# fall into the nearer half once in 1,000 scans.
+FEWEST_PAIRS = 20
+CLEARLY_MORE = 5
 
 
 def directions(xyz: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -21,3 +40,81 @@ def directions(xyz: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[n
     azimuth = np.degrees(np.arctan2(y, x))
     inclination = np.degrees(np.arctan2(z, np.sqrt(x * x + y * y)))
     return azimuth, inclination
+
+
+def shared_direction_pairs(xyz: NDArray[np.float32], evident: bool = True) -> NDArray[np.int64]:
+    """Pairs of points that lie in one direction from the sensor.
+
+    Args:
+        xyz: Finite and distinct positions other than the origin, float32 (M, 3), metres in the
+            sensor frame.
+        evident: Whether pairs are none where so many could have come about by chance. Otherwise,
+            such are those within the second smallest of TOLERANCES.
+
+    Returns:
+        int64 (P, 2), the lower number first; no point with as many as MOST_RETURNS others.
+    """
+    pairs, gap = _near_pairs(*directions(xyz), TOLERANCES[0])
+    for tolerance in TOLERANCES:
+        near = _uncrowded(pairs, gap <= tolerance, len(xyz))
+        nearer_half = int((gap[near] <= tolerance / 2).sum())
+        farther_half = int(near.sum()) - nearer_half
+        if nearer_half >= max(FEWEST_PAIRS, CLEARLY_MORE * farther_half):
+            return pairs[near]
+    if evident:
+        return pairs[:0]
+    return pairs[_uncrowded(pairs, gap <= TOLERANCES[-2], len(xyz))]
+
+
+def _near_pairs(
+    azimuth: NDArray[np.float64], inclination: NDArray[np.float64], tolerance: float
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Pairs of directions that differ by at most a tolerance, and by how much.
+
+    Args:
+        azimuth: float64 (M,), degrees in [-180, 180].
+        inclination: float64 (M,), degrees in [-90, 90].
+        tolerance: Degrees.
+
+    Returns:
+        int64 (P, 2), the lower number first, and degrees, float64 (P,). A direction that has more
+        than MOST_RETURNS others about it has some of them only.
+    """
+    # Slabs of inclination are laid end to end and sorted along. What two slabs divide lies in the
+    # middle of one of those that are moved by half their height.
+    found = [_along_slabs(azimuth, inclination, tolerance, moved) for moved in (0.0, 0.5)]
+    pairs, gap = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    _, first = np.unique(pairs[:, 0] * len(azimuth) + pairs[:, 1], return_index=True)
+    return pairs[first], gap[first]
+
+
+def _along_slabs(
+    azimuth: NDArray[np.float64], inclination: NDArray[np.float64], tolerance: float, moved: float
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Those of the pairs that lie in one slab, of twice the tolerance in height."""
+    height = 2 * tolerance
+    slab = np.floor(inclination / height + moved)
+    # Along the arc, since a degree of azimuth is the shorter the higher up it is.
+    shorter = np.cos(np.radians((slab + 0.5 - moved) * height).clip(-np.pi / 2, np.pi / 2))
+    along, turn = azimuth * shorter, 360 * shorter
+    # What lies just behind the end of the circle lies just before its beginning.
+    again = np.flatnonzero(along + turn / 2 <= tolerance)
+    point = np.concatenate([np.arange(len(azimuth)), again])
+    place = np.concatenate([along, along[again] + turn[again]]) + slab[point] * 1000
+    order = np.argsort(place, kind="stable")
+    point, place = point[order], place[order]
+    pairs, gaps = [], []
+    for step in range(1, MOST_RETURNS + 1):
+        one, other = point[:-step], point[step:]
+        across = np.abs(inclination[one] - inclination[other])
+        gap = np.maximum(place[step:] - place[:-step], across)
+        near = np.flatnonzero((gap <= tolerance) & (one != other))
+        pairs.append(np.sort(np.stack([one[near], other[near]], axis=1), axis=1))
+        gaps.append(gap[near])
+    return np.concatenate(pairs), np.concatenate(gaps)
+
+
+def _uncrowded(pairs: NDArray[np.int64], near: NDArray[np.bool_], points: int) -> NDArray[np.bool_]:
+    """Those of the near pairs whose points are in fewer than MOST_RETURNS of them, bool (P,)."""
+    crowded = np.bincount(pairs[near].ravel(), minlength=points) >= MOST_RETURNS
+    return near & ~crowded[pairs].any(axis=1)

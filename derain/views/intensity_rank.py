@@ -30,4 +30,20 @@ def intensity_rank(scan: Scan) -> NDArray[np.int64]:
     steps = np.arange(1, INTENSITY_RANKS) / INTENSITY_RANKS * darker[-1]
     first_level = np.searchsorted(darker[:-1], steps)
     edges = np.append(levels, np.float32(np.inf))[first_level]
-    return np.searchsorted(edges, intensity, side="right")
+    return edges_reached(intensity, edges)
+
+
+def edges_reached(values: NDArray[np.float32], edges: NDArray[np.float32]) -> NDArray[np.int64]:
+    """How many edges are no greater than each value.
+
+    Args:
+        values: float32 (N,).
+        edges: A few, which are faster to compare one by one than to search, float32 (E,).
+
+    Returns:
+        int64 (N,); 0 where a value is NaN.
+    """
+    reached = np.zeros(len(values), np.uint8)
+    for edge in edges:
+        reached += values >= edge
+    return reached.astype(np.int64)

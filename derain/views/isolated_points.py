@@ -15,20 +15,35 @@ from numpy.typing import NDArray
 
 from derain.files.documents import Entry
 from derain.scan import Scan
-from derain.views.beams import SAMPLED, STEP_NEIGHBOURS, beam_step, crowding
-from derain.views.intensity_rank import INTENSITY_RANKS, intensity_rank
+from derain.views.intensity_rank import INTENSITY_RANKS, edges_reached, intensity_rank
 from derain.views.merged_points import are_one_return, merged_points
 from derain.views.morton import distinct_rows
 from derain.views.neighbour_search import NeighbourSearch
 from derain.views.neighbours import MOST_NETWORK_NEIGHBOURS, of_points_to_rows
-from derain.views.registry import VIEWS
 from derain.views.spherical_grid import ALL_AROUND
-from derain.views.view import BackProjection, View, ViewedScan
+from derain.views.view import VIEWS, BackProjection, View, ViewedScan
 
-# A point is isolated if no more than this crowds it, see :func:`derain.views.beams.crowding`. A
+# A point is isolated if no more than this crowds it, see :func:`crowding`. A
 # third of a scan is, and 99 % of simulated rain and snow; what is left out has others all around.
 # Source: modelling choice, on simulated worlds.
 MOST_CROWDED = 5.0
+
+# The step of a scan is the median over so many of its points, evenly along their curve.
+SAMPLED = 8192
+
+# A step is the angle within which a point's nearest neighbours lie, so many of them: two on either
+# side along the axis of finer resolution, and one across it.
+STEP_NEIGHBOURS = 3
+
+# The least step, radians, and the step of a scan of too few points.
+FINEST_STEP, USUAL_STEP = 1e-4, 0.1
+
+# Nothing is measured nearer than this, metres; it keeps every division finite.
+NEAREST_POINT = 0.05
+
+# Points before and after one along the curve that may crowd it, and the distance at which one
+# counts half, steps.
+WINDOW, HALF_AT = 8, 2.0
 
 # What the view takes of a point besides the rank of its intensity.
 CHANNELS = ("x", "y", "z")
@@ -167,8 +182,7 @@ class IsolatedPointView(View):
 
     def __call__(self, scan: Scan) -> IsolatedPoints:
         """Views a scan."""
-        first, inverse, search, step = self._returns(scan)
-        xyz = scan.xyz.take(first, axis=0)
+        first, inverse, xyz, search, step = self._returns(scan)
         isolated = np.flatnonzero(crowding(xyz, step) <= MOST_CROWDED)
         neighbours, distances = search(self.neighbours, isolated)
         cell = _cells(xyz, intensity_rank(scan)[first])
@@ -186,31 +200,32 @@ class IsolatedPointView(View):
 
     def _returns(
         self, scan: Scan
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NeighbourSearch, float]:
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32], NeighbourSearch, float]:
         """The distinct returns of a scan, and the step between its beams.
 
         Returns:
-            ``first`` and ``inverse`` as of :class:`IsolatedPoints`; what finds neighbours among
-            them; and radians.
+            ``first``, ``inverse`` and ``points`` as of :class:`IsolatedPoints`; what finds
+            neighbours among these; and radians.
         """
         first, inverse = distinct_rows(scan)
-        search, step, doubled = self._searched(scan, first)
+        # take is four times faster than indexing for rows of three numbers.
+        xyz = scan.xyz.take(first, axis=0)
+        search, step, doubled = self._searched(xyz, first)
         if doubled:
-            xyz = scan.xyz.take(first, axis=0)
             kept, point = merged_points(xyz, first, *search(1 + STEP_NEIGHBOURS))
             first, inverse = first[kept], np.append(point, -1)[inverse]
-            search, step, _ = self._searched(scan, first)
-        return first, inverse, search, step
+            xyz = xyz.take(kept, axis=0)
+            search, step, _ = self._searched(xyz, first)
+        return first, inverse, xyz, search, step
 
     def _searched(
-        self, scan: Scan, first: NDArray[np.int64]
+        self, xyz: NDArray[np.float32], first: NDArray[np.int64]
     ) -> tuple[NeighbourSearch, float, bool]:
         """What finds neighbours, the step, and whether some returns are written more than once.
 
         The latter two are those of a sample: where none of thousands is written twice, the few that
         may be make no difference.
         """
-        xyz = scan.xyz.take(first, axis=0)
         search = NeighbourSearch(xyz, rank=first, threads=self.threads)
         some = np.unique(np.arange(SAMPLED) * len(first) // SAMPLED)[: len(first)]
         neighbours, distances = search(1 + STEP_NEIGHBOURS, some)
@@ -227,6 +242,64 @@ def _cells(xyz: NDArray[np.float32], rank: NDArray[np.int64]) -> NDArray[np.int6
     """
     x, y, z = np.ascontiguousarray(xyz.T)
     squared = x * x + y * y + z * z
-    shell = np.searchsorted(np.square(SHELL_EDGES).astype(np.float32), squared, side="right")
-    cell: NDArray[np.int64] = shell * INTENSITY_RANKS + rank
-    return cell
+    shell = edges_reached(squared, np.square(SHELL_EDGES).astype(np.float32))
+    return shell * INTENSITY_RANKS + rank
+
+
+def beam_step(
+    xyz: NDArray[np.float32], rows: NDArray[np.int64], neighbours: NDArray[np.int64]
+) -> float:
+    """The angle between neighbouring beams, by what lies near some points.
+
+    Args:
+        xyz: Positions in the sensor's frame, float32 (M, 3), metres.
+        rows: Some of the points, int64 (Q,).
+        neighbours: Each of these and its nearest neighbours, rows of ``xyz``, int64
+            (Q, 1 + STEP_NEIGHBOURS).
+
+    Returns:
+        Radians.
+    """
+    if len(xyz) <= STEP_NEIGHBOURS:
+        return USUAL_STEP
+    own = _directions(xyz.take(rows, axis=0))
+    chords = np.zeros(len(rows))
+    for column in neighbours[:, 1:].T:
+        other = _directions(xyz.take(column, axis=0))
+        chords = np.maximum(chords, np.square(other - own).sum(axis=0))
+    return max(float(np.sqrt(np.median(chords))), FINEST_STEP)
+
+
+def _directions(xyz: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Unit vectors to some points, float64 (3, Q)."""
+    axes = np.array(xyz.T, np.float64, order="C")
+    length = np.maximum(np.sqrt(np.square(axes).sum(axis=0)), NEAREST_POINT)
+    directions: NDArray[np.float64] = axes / length
+    return directions
+
+
+def crowding(xyz: NDArray[np.float32], step: float) -> NDArray[np.float32]:
+    """How many others are near each point, each counting the less the farther it is.
+
+    Only what lies near it along the curve is looked at, so that nothing is searched for: a crowded
+    point is crowded for sure, and one that seems to be alone may not be.
+
+    Args:
+        xyz: Positions in the sensor's frame along a Morton curve, float32 (M, 3), metres.
+        step: Angle between neighbouring beams, radians.
+
+    Returns:
+        From 0 to twice WINDOW, float32 (M,).
+    """
+    x, y, z = np.ascontiguousarray(xyz.T)
+    squared = np.maximum(x * x + y * y + z * z, np.float32(NEAREST_POINT**2))
+    per_half = 1 / (squared * np.float32((HALF_AT * step) ** 2))
+    result = np.zeros(len(xyz), np.float32)
+    for apart in range(1, min(WINDOW, len(xyz) - 1) + 1):
+        before, after = slice(None, -apart), slice(apart, None)
+        distance = np.square(x[after] - x[before])
+        distance += np.square(y[after] - y[before])
+        distance += np.square(z[after] - z[before])
+        for side in (before, after):
+            result[side] += 1 / (1 + distance * per_half[side])
+    return result

@@ -63,23 +63,35 @@ def distinct_positions(xyz: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDA
     """
     code = morton_code(xyz)
     order = _ascending(code)
-    code, points = code[order], xyz.take(order, axis=0)
-    new_cell = np.ones(len(xyz), bool)
-    new_cell[1:] = code[1:] != code[:-1]
-    new_point = np.ones(len(xyz), bool)
-    new_point[1:] = _steps(points)
-    if (mixed := new_point & ~new_cell).any():
+    code = code.take(order)
+    new = np.ones(len(xyz), bool)
+    new[1:] = code[1:] != code[:-1]
+    behind = np.flatnonzero(~new)  # those whose cell is that of the point before them
+    moved = _differ(xyz, order, behind)
+    if moved.any():
         # In a cell of several points, equal ones may lie apart: sort inside such cells.
-        cell = np.cumsum(new_cell) - 1
-        shared = np.zeros(len(xyz), bool)
-        shared[cell[mixed]] = True
-        inside = shared[cell]
-        order[inside] = order[inside][np.lexsort((*points[inside].T, code[inside]))]
-        points = xyz.take(order, axis=0)
-        new_point[1:] = _steps(points)
+        cell = np.cumsum(new)
+        mixed = np.zeros(len(xyz) + 1, bool)
+        mixed[cell[behind[moved]]] = True
+        inside = np.flatnonzero(mixed[cell])
+        rows = order[inside]
+        order[inside] = rows[np.lexsort((*xyz.take(rows, axis=0).T, code[inside]))]
+        moved = _differ(xyz, order, behind)
+    new[behind] = moved
     inverse = np.empty(len(xyz), np.int64)
-    inverse[order] = np.cumsum(new_point) - 1
-    return order[new_point], inverse
+    inverse[order] = np.cumsum(new) - 1
+    return order[new], inverse
+
+
+def _differ(
+    xyz: NDArray[np.float32], order: NDArray[np.int64], places: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Whether points at some places of an order are elsewhere than those before them, bool (Q,)."""
+    own = xyz.take(order[places], axis=0)
+    before = xyz.take(order[places - 1], axis=0)
+    x, y, z = (own != before).T
+    result: NDArray[np.bool_] = x | y | z
+    return result
 
 
 def _ascending(code: NDArray[np.uint64]) -> NDArray[np.int64]:
@@ -120,13 +132,6 @@ def first_rows(scan: Scan) -> NDArray[np.int64]:
         Row numbers, int64 (M,).
     """
     return np.sort(distinct_rows(scan)[0])
-
-
-def _steps(points: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """True where a point is not where the one before it is, bool (N − 1,)."""
-    x, y, z = points.T
-    result: NDArray[np.bool_] = (x[1:] != x[:-1]) | (y[1:] != y[:-1]) | (z[1:] != z[:-1])
-    return result
 
 
 def evenly(rows: NDArray[np.int64], most: int) -> NDArray[np.int64]:

@@ -14,9 +14,8 @@ from derain.views.candidates import Candidates
 from derain.views.channels import filled_values
 from derain.views.morton import distinct_rows
 from derain.views.neighbour_search import NeighbourSearch
-from derain.views.registry import VIEWS
 from derain.views.spherical_grid import ALL_AROUND
-from derain.views.view import BackProjection, View, ViewedScan
+from derain.views.view import VIEWS, BackProjection, View, ViewedScan
 
 # The most that the Spec of a network may ask for, seven times as many as 3D-OutDet looks at. A
 # hundred thousand points have 80 MB of them.

@@ -15,9 +15,8 @@ from derain.scan import Scan
 from derain.views.back_projection import BACK_PROJECTIONS, ProjectedPoints
 from derain.views.candidates import Candidates
 from derain.views.channels import channel_image
-from derain.views.registry import VIEWS
 from derain.views.spherical_grid import SphericalGrid, grid_at
-from derain.views.view import IGNORED, BackProjection, View, ViewedScan
+from derain.views.view import IGNORED, VIEWS, BackProjection, View, ViewedScan
 
 # What a pixel shows. Taken as one integer, what is nearer is less, and of equally near points the
 # lower row: the bits of ranges, none of which is negative, ascend as the ranges do.

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.scan import Scan
+from derain.views.directions import shared_direction_pairs
 from derain.views.morton import distinct_rows
 from derain.views.return_columns import LEAST_APART, StatedReturns, stated_returns
-from derain.views.shared_directions import shared_direction_pairs
 
 # By what returns are told where no column says.
 BY_DIRECTIONS = "directions"

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.files.documents import Entry
 from derain.scan import Scan
+from derain.system.registry import Registry
 from derain.views.candidates import Candidates
 from derain.views.window import Window, WindowOfScans
 
@@ -155,3 +156,7 @@ class View(ABC):
             scans: The scan, with others of its sequence. What is seen has its rows, not theirs.
         """
         return self(scans.scan)
+
+
+# Every view, by the name that it has in a Spec.
+VIEWS: Registry[type[View]] = Registry("derain.views", attribute="NAME")

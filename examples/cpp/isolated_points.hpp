@@ -21,7 +21,7 @@ constexpr std::array<float, 10> kShellEdges = {2.10523319F, 4.43200731F, 9.33040
                                                41.3524399F, 87.0565338F, 183.274307F, 385.835175F,
                                                812.273071F, 1710.02429F};
 
-// As in derain/views/beams.py: points of the sample, neighbours within a step, least and usual step,
+// As in derain/views/isolated_points.py: points of the sample, neighbours within a step, least and usual step,
 // nearest range, points along the curve, and steps at which one counts half.
 constexpr std::size_t kSampled = 8192;
 constexpr std::size_t kStepNeighbours = 3;

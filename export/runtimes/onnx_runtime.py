@@ -32,6 +32,8 @@ class OnnxRuntimeSession(Session):
         options.intra_op_num_threads = threads
         options.inter_op_num_threads = 1
         options.log_severity_level = 3
+        # It would reserve memory for each size of scan anew, beside what other sizes have left.
+        options.enable_mem_pattern = False
         # Threads may spin while the network runs; after it, the cores are for the next scan's view.
         options.add_session_config_entry("session.force_spinning_stop", "1")
         try:

@@ -100,8 +100,8 @@ class Geometry(nn.Module):
         features = active(self.neighbourhood(torch.cat([around, far[None]])))
         features = features + self._context(features, far, counts.sum(dim=1))
         opinions = torch.cat([active(self.to_opinion(features)).T, self.of_crowded])
-        heard = functional.embedding(others.T, opinions).flatten(1).T
-        features = features + active(self.from_opinions.weight @ heard + self.opinions(features))
+        heard = functional.embedding(others.T, opinions).flatten(1)
+        features = features + active(self.from_opinions(heard).T + self.opinions(features))
         return features, self.head(features)[0]
 
     def _context(self, features: Tensor, far: Tensor, points: Tensor) -> Tensor:
@@ -153,9 +153,10 @@ def in_steps(
         whichever side, and how far up; float (NEIGHBOUR_NUMBERS, k - 1, S). And the logarithms of
         the points' ranges over 10 m, float (S,).
     """
-    places = functional.embedding(neighbours, points).permute(2, 0, 1)
-    x, y, z = places[:, 0]
-    ahead, left, up = places[:, 1:] - places[:, :1]
+    axes = points.unbind(1)
+    x, y, z = (taken(axis, neighbours[0]) for axis in axes)
+    around = [taken(axis, neighbours[1:]) for axis in axes]
+    ahead, left, up = around[0] - x, around[1] - y, around[2] - z
     level = (x * x + y * y).sqrt().clamp_min(NEAREST_TO_AXIS)
     distance = (x * x + y * y + z * z).sqrt().clamp_min(NEAREST_POINT)
     level_dot = x * ahead + y * left
@@ -173,3 +174,16 @@ def in_steps(
         ]
     )
     return seen.clamp(-FARTHEST_IN_STEPS, FARTHEST_IN_STEPS), torch.log(distance / USUAL_RANGE)
+
+
+def taken(values: Tensor, numbers: Tensor) -> Tensor:
+    """Some of the values by their numbers, in the shape of these.
+
+    It is ``values[numbers]``, in a form that onnxruntime computes a dozen times faster.
+    """
+    return values.gather(0, numbers.flatten()).reshape(numbers.shape)
+
+
+def taken_of_each(rows: Tensor, numbers: Tensor) -> Tensor:
+    """Some of the values of each row by their numbers (D,), as :func:`taken`: (R, D) of (R, S)."""
+    return rows.gather(1, numbers.expand(rows.shape[0], -1))

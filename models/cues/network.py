@@ -7,7 +7,13 @@ import torch
 from torch import Tensor, nn
 
 from derain.models.beam_steps import NEAREST_POINT, USUAL_RANGE, both_logits
-from derain.models.cues.geometry import AcrossFeatures, Geometry, in_steps
+from derain.models.cues.geometry import (
+    AcrossFeatures,
+    Geometry,
+    in_steps,
+    taken,
+    taken_of_each,
+)
 from derain.views.intensity_rank import INTENSITY_RANKS
 
 # Log-odds are cut to this either way; those of crowded neighbours are taken to be the second.
@@ -129,8 +135,7 @@ class CueNetwork(nn.Module):
         features, rain = self.geometry(seen, far, others, counts)
         doubtful = torch.nonzero(rain > DOUBTFUL)[:, 0]
         cues = Cues(far, cell, distances, neighbours, others, counts, doubtful)
-        # Transposed, each point's features are copied in one piece: faster in onnxruntime.
-        answers, features = [rain], features.T.index_select(0, doubtful).T
+        answers, features = [rain], taken_of_each(features, doubtful)
         for fusion in self.rounds:
             with torch.no_grad():
                 given = cues.around(answers[-1])
@@ -183,16 +188,15 @@ class Cues:
         doubtful: Tensor,
     ) -> None:
         self._counts, self._doubtful = counts, doubtful
-        self._cell_of_isolated = cell.index_select(0, neighbours[0])
+        self._cell_of_isolated = taken(cell, neighbours[0])
         self._cell = taken(self._cell_of_isolated, doubtful)
         around = slice(1, APART[-1] + 1)
-        self._others = others[around].index_select(1, doubtful)
-        self._cell_of_others = taken(cell, neighbours[around].index_select(1, doubtful))
+        self._others = taken_of_each(others[around], doubtful)
+        self._cell_of_others = taken(cell, taken_of_each(neighbours[around], doubtful))
         # Shifted and scaled, here and below, so that all numbers are of the order of 1.
         far = taken(far, doubtful)
-        apart = distances[APART, :].index_select(1, doubtful) / (USUAL_RANGE * far.exp()).clamp_min(
-            NEAREST_POINT
-        )
+        range_ = (USUAL_RANGE * far.exp()).clamp_min(NEAREST_POINT)
+        apart = taken_of_each(distances[APART, :], doubtful) / range_
         rank = (self._cell % INTENSITY_RANKS).to(far.dtype) / (INTENSITY_RANKS - 1)
         self._places = torch.cat(
             [(far + 0.3)[None], torch.log(apart + NEAREST_APART) + 4, rank[None]]
@@ -296,11 +300,3 @@ def _along(rows: Tensor) -> Tensor:
     before = torch.cat([rows[:1], rows[:-1]])
     after = torch.cat([rows[1:], rows[-1:]])
     return 0.5 * rows + 0.25 * (before + after)
-
-
-def taken(values: Tensor, numbers: Tensor) -> Tensor:
-    """Some of the values by their numbers, in the shape of these.
-
-    It is ``values[numbers]``, in a form that onnxruntime computes several times faster.
-    """
-    return values.index_select(0, numbers.flatten()).reshape(numbers.shape)

@@ -22,7 +22,7 @@ from derain.export.runtime import Derainer
 from derain.spec import Spec
 from derain.views.back_projection import BACK_PROJECTIONS
 from derain.views.candidates import Candidates
-from derain.views.registry import VIEWS
+from derain.views.view import VIEWS
 
 from .hard_points import hard_points, hard_scans
 

@@ -61,14 +61,6 @@ def test_valid_points_of_a_hard_scan_have_finite_values(scan: Scan) -> None:
     np.testing.assert_array_equal(np.isnan(values).any(axis=1), np.array(absent) & (len(rows) > 0))
 
 
-def test_the_scan_is_left_as_it_was() -> None:
-    column = np.array([np.nan, 1], np.float32)
-    scan = Scan(np.ones((2, 3), np.float32), fields={"rcs": column})
-    filled_values(scan, np.arange(2), ["x", "rcs"], {"rcs": 5.0})[:] = 8
-    assert np.isnan(column[0])
-    assert scan.xyz.max() == 1
-
-
 def test_columns_are_kept_by_name_and_all_others_left_behind() -> None:
     fields = {"RCS": np.arange(3), "time": np.arange(3), "doppler": np.array([1.0, np.inf, 3.0])}
     scan = Scan(np.ones((3, 3), np.float32), fields=fields, radar=np.array([True, False, True]))
@@ -87,12 +79,3 @@ def test_an_image_holds_the_values_of_its_winners_and_zero_where_there_is_none()
     image = channel_image(scan, winner, ["y", "doppler", "rcs"], {"doppler": -0.5, "rcs": 4.0})
     assert image.dtype == np.float32
     assert image.tolist() == [[7, 0, 4, 1, 7, 0], [3, 0, -0.5, 1, 3, 0], [4, 0, 4, 4, 4, 0]]
-
-
-@pytest.mark.parametrize("scan", HARD_CASES.values(), ids=HARD_CASES)
-def test_an_image_of_all_valid_points_holds_what_they_measure(scan: Scan) -> None:
-    winner = np.where(scan.valid, np.arange(len(scan)), -1)
-    image = channel_image(scan, winner, EVERYTHING, {"intensity": 9.0})
-    filled = filled_values(scan, np.flatnonzero(scan.valid), EVERYTHING, {"intensity": 9.0}).T
-    np.testing.assert_array_equal(image[:, scan.valid], filled)
-    assert not image[:, ~scan.valid].any()

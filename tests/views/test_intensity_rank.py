@@ -31,6 +31,12 @@ def test_ranks_keep_the_order_of_intensities_in_whatever_unit(
     assert in_order[-1] < INTENSITY_RANKS
 
 
+def test_as_many_levels_as_ranks_have_one_each() -> None:
+    level = np.resize(np.arange(INTENSITY_RANKS), 4 * INTENSITY_RANKS)
+    rank = intensity_rank(of_intensities(level.astype(np.float32), len(level)))
+    np.testing.assert_array_equal(rank, level)
+
+
 def test_intensities_are_told_apart_where_most_points_share_one() -> None:
     intensity = np.repeat(np.arange(20, dtype=np.float32), [8000] + [100] * 19)
     rank = intensity_rank(of_intensities(intensity, len(intensity)))

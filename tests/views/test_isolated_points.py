@@ -10,15 +10,18 @@ from numpy.typing import NDArray
 
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.scan import Scan
-from derain.views.beams import FINEST_STEP, HALF_AT, WINDOW, beam_step, crowding
 from derain.views.intensity_rank import INTENSITY_RANKS, intensity_rank
 from derain.views.isolated_points import (
     FARTHEST,
-    MOST_CROWDED,
+    FINEST_STEP,
+    HALF_AT,
     NEAREST,
     SHELLS,
+    WINDOW,
     IsolatedPoints,
     IsolatedPointView,
+    beam_step,
+    crowding,
 )
 from derain.views.neighbour_search import NeighbourSearch
 
@@ -165,8 +168,3 @@ def test_the_step_is_that_of_the_beams(degrees: float) -> None:
     step = beam_step(xyz, np.arange(len(xyz)), neighbours)
     assert step == pytest.approx(np.radians(degrees), rel=0.1)
     assert beam_step(xyz[:1], np.arange(1), neighbours[:1]) >= FINEST_STEP
-
-
-def test_the_bound_keeps_what_no_two_others_are_near() -> None:
-    # Two at the point itself, sixteen far off: less than the bound, so that doubled drops stay.
-    assert 2 < MOST_CROWDED < 2 * WINDOW

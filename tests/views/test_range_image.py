@@ -82,13 +82,6 @@ def test_the_order_of_the_rows_changes_nothing_but_ties(
     np.testing.assert_array_equal(shuffled.image[0], image.image[0])
 
 
-def test_a_view_has_the_channels_it_is_asked_for_in_their_order() -> None:
-    scan = Scan.of([[3, 0, 4, 7]])
-    view = RangeView(SphericalGrid.even(1, 1, (-90, 90)), channels=("intensity", "z", "range"))
-    assert view(scan).image.ravel().tolist() == [7, 4, 5]
-    assert view(scan).image.dtype == np.float32
-
-
 def test_a_pixel_shows_the_columns_of_its_nearest_point_and_a_stand_in_for_gaps() -> None:
     columns = {"doppler": np.array([1.0, 2.0, np.nan]), "radar": np.array([0, 1, 1], np.uint8)}
     xyz = np.array([[9, 0, 0], [3, 0, 0], [0, 9, 0]], np.float32)
@@ -119,12 +112,6 @@ def test_hidden_are_the_points_behind_a_nearer_one_and_not_its_copies() -> None:
     image = RangeView(FULL)(scan)
     assert image.hidden.tolist() == [False, True, False, False, False]
     assert image.pixel[3:].tolist() == [-1, -1]
-
-
-def test_invalid_rows_and_points_outside_get_zero() -> None:
-    scan = Scan.of([[3, 0, 0, 1], [np.nan, 0, 0, 1], [-3, 0, 0, 1], [0, 0, 3, 1]])
-    image = RangeView(FRONT)(scan)
-    assert image.back(np.ones(image.size, np.float32)).tolist() == [1, 0, 0, 0]
 
 
 BOUNDS = st.builds(
@@ -181,13 +168,6 @@ def pixels_around(grid: SphericalGrid, pixel: int) -> list[int]:
     if not grid.is_full_circle:
         columns = [number for number in columns if 0 <= number < grid.columns]
     return [above * grid.columns + beside % grid.columns for above in rows for beside in columns]
-
-
-def test_a_view_judging_candidates_is_the_same_otherwise() -> None:
-    candidates = Candidates((Bound("range", most=10.0),))
-    view = RangeView(FRONT, ("z", "range"), "vote", {"z": 1.0})
-    assert view.with_candidates(candidates) == replace(view, candidates=candidates)
-    assert view.with_candidates(candidates).as_dict() == view.as_dict()
 
 
 def test_packing_keeps_every_scan_to_its_own_image() -> None:

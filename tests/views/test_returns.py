@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from derain.evaluation.hard_cases import hard_cases
 from derain.files import read_scan
 from derain.scan import Scan
+from derain.views.directions import FEWEST_PAIRS, TOLERANCES, shared_direction_pairs
 from derain.views.return_columns import LEAST_APART
 from derain.views.returns import RayReturns, pair_returns
-from derain.views.shared_directions import FEWEST_PAIRS, TOLERANCES, shared_direction_pairs
 
 from ..two_returns import Recording
 

@@ -142,10 +142,6 @@ def test_beams_at_the_poles_stay_below_them() -> None:
     assert SphericalGrid.of_beams([90, 70, -80], 4).edges == (90.0, 80.0, -5.0, -90.0)
 
 
-def test_no_points_have_no_pixels() -> None:
-    assert FULL.pixel(np.zeros((0, 3), np.float32)).shape == (0,)
-
-
 @settings(deadline=None)
 @given(grids())
 def test_a_grid_comes_back_from_json_bit_for_bit(grid: SphericalGrid) -> None:

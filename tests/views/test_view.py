@@ -16,9 +16,8 @@ from derain.spec import Spec
 from derain.views.isolated_points import CHANNELS, IsolatedPointView
 from derain.views.neighbours import Neighbourhoods, NeighbourView
 from derain.views.range_image import RangeView
-from derain.views.registry import VIEWS
 from derain.views.spherical_grid import ALL_AROUND, grid_of
-from derain.views.view import View
+from derain.views.view import VIEWS, View
 from derain.views.window import PlacedScan, Window, WindowOfScans
 
 OURS = {

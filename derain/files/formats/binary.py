@@ -156,8 +156,11 @@ def _reach(name: str) -> float:
 def _check_intensity(path: Path, scan: Scan) -> None:
     if scan.intensity is None:
         return
+    negative = (scan.intensity < 0) & (scan.intensity != SENTINEL)
+    if not negative.any():
+        return
     finite = np.isfinite(scan.xyz).all(axis=1) & np.isfinite(scan.intensity)
-    negative = finite & (scan.intensity < 0) & (scan.intensity != SENTINEL)
+    negative &= finite
     if negative.sum() > LARGEST_NEGATIVE_SHARE * finite.sum():
         share = negative.sum() / finite.sum()
         raise InputError(
