@@ -11,7 +11,6 @@ from derain.annotation import scene as module
 from derain.annotation.scene import (
     Box,
     Correction,
-    PlaneSearch,
     Rectangle,
     Scene,
     inside,
@@ -70,7 +69,6 @@ SCENE = Scene(
     },
     rain_area=((0, -9), (60, -9), (60, 9), (0, 9)),
     height=0.15,
-    plane=PlaneSearch(distance=0.2, points=3, iterations=50, scans=2, seed=7),
     corrections={
         "003": {"car_1": Correction((0.2, 0, 0), (4, 2, 1), 0.0)},
         "005": {"car_1": Correction(shift=(1, 0, 0.25))},
@@ -85,7 +83,6 @@ boxes:
   mast_1: {class: sprinkler, centre: [8, 4.5, 0.7], size: [0.3, 0.3, 4]}
 rain_area: [[0, -9], [60, -9], [60, 9], [0, 9]]
 height: 0.15
-plane: {distance: 0.2, points: 3, iterations: 50, scans: 2, seed: 7}
 corrections:
   "003": {boxes: {car_1: {shift: [0.2, 0, 0], size: [4, 2, 1], heading: 0}}}
   "005": {boxes: {car_1: {shift: [1, 0, 0.25]}}}
@@ -128,9 +125,6 @@ def test_corrections_hold_in_their_sequence_and_change_what_they_state_alone() -
         ("road: [[0, 0], [1, 0], [0, 1, 2]]", "road[2]", "are not 2 numbers"),
         ("road: [[0, 0], [1, 0], [0, 1e300]]", "road[2][1]", "1e+300 is not within"),
         (ROAD + "height: -1e300", "height", "-1e+300 is not within"),
-        (ROAD + "plane: {distance: 1e300}", "plane.distance", "1e+300 is not within"),
-        (ROAD + "plane: {points: 2}", "plane.points", "2 is not a whole number from 3 to 100"),
-        (ROAD + "plane: {iterations: 1000000000000}", "plane.iterations", "is not a whole number"),
         (ROAD + "boxes: {a: {class: car}}", "boxes.a", "centre is missing"),
         (ROAD + f"boxes: {{a: {BOX.replace('car', 'cart')}}}", "boxes.a.class", "no class 'cart'"),
         (ROAD + f"boxes: {{a: {BOX.replace('1]', '0]')}}}", "boxes.a.size[2]", "0 is not above 0"),
