@@ -21,7 +21,7 @@ from matplotlib.path import Path as Outline
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.files.documents import Entry, shown
+from derain.files.documents import Entry
 from derain.simulation.classes import TrackClass
 
 Triple = tuple[float, float, float]
@@ -239,11 +239,7 @@ def _correction(entry: Entry) -> Correction:
 
 
 def _class(entry: Entry) -> TrackClass:
-    if not isinstance(entry.value, str) or entry.value not in CLASS_BY_NAME:
-        raise entry.fault(
-            f"there is no class {shown(entry.value)}", f"Known are {', '.join(CLASS_BY_NAME)}."
-        )
-    return CLASS_BY_NAME[entry.value]
+    return CLASS_BY_NAME[entry.one_of(CLASS_BY_NAME)]
 
 
 def _triple(entry: Entry) -> Triple:

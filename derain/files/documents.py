@@ -10,13 +10,14 @@ import re
 import reprlib
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
 
 import yaml
 
 from derain.errors import InputError, did_you_mean
-from derain.files.reading import reading
+from derain.files.reading import is_file, reading
 
 # Far more than any card, scene or Spec takes, and read in a second.
 LARGEST_DOCUMENT = 2**20
@@ -269,6 +270,15 @@ class Entry:
             raise self.fault("it has a null character", "Leave it out.")
         return self.value
 
+    def one_of(self, choices: Collection[Parsed]) -> Parsed:
+        """One of some known texts."""
+        for choice in choices:
+            if choice == self.value:
+                return choice
+        raise self.fault(
+            f"{shown(self.value)} is not known", f"Known are {', '.join(map(str, choices))}."
+        )
+
     def texts(self) -> tuple[str, ...]:
         """A list of texts."""
         return tuple(item.text() for item in self.items())
@@ -340,3 +350,32 @@ def _refuse_expanding_aliases(text: str, most: int, aliases: bool) -> None:
         depth -= isinstance(event, yaml.CollectionEndEvent)
         if depth > DEEPEST:
             raise ValueError(f"nested more than {DEEPEST} deep")
+
+
+def packaged(package: str, folder: str = "") -> dict[str, Path]:
+    """The YAML files of a package, by name, sorted: each is found by being there.
+
+    Args:
+        package: Name of the package, such as ``derain.cards``.
+        folder: Folder within it, where they do not lie beside the package's modules.
+    """
+    files = Path(str(resources.files(package))) / folder
+    return {file.stem: file for file in sorted(files.glob("*.yaml"))}
+
+
+def packaged_or_own(name: str | Path, files: Mapping[str, Path], kind: str) -> Path:
+    """The file that a user names.
+
+    Args:
+        name: Name of a packaged file, or the path of one of the user's own.
+        files: The packaged ones, by name.
+        kind: What they are, such as "sensor", for the message.
+
+    Raises:
+        InputError: There is no such file.
+    """
+    path = files.get(str(name), Path(name))
+    if not is_file(path):
+        remedy = f"{did_you_mean(name, files)}Give a YAML file or one of {', '.join(files)}."
+        raise InputError(name, f"no such {kind}", remedy)
+    return path

@@ -90,7 +90,7 @@ def of_scan(**values: Any) -> dict[str, Any]:
         (of_scan(key="/a"), "is not the name of a scan"),
         (of_scan(key="a//b"), "is not the name of a scan"),
         (of_scan(key=""), "is not the name of a scan"),
-        (of_scan(part="test"), "Give train or validation"),
+        (of_scan(part="test"), "'test' is not known"),
         (of_scan(number=-1), "is not a whole number"),
         ({"made_by": "derain.teaching"}, "teacher is missing"),
     ],

@@ -126,7 +126,11 @@ def test_corrections_hold_in_their_sequence_and_change_what_they_state_alone() -
         ("road: [[0, 0], [1, 0], [0, 1e300]]", "road[2][1]", "1e+300 is not within"),
         (ROAD + "height: -1e300", "height", "-1e+300 is not within"),
         (ROAD + "boxes: {a: {class: car}}", "boxes.a", "centre is missing"),
-        (ROAD + f"boxes: {{a: {BOX.replace('car', 'cart')}}}", "boxes.a.class", "no class 'cart'"),
+        (
+            ROAD + f"boxes: {{a: {BOX.replace('car', 'cart')}}}",
+            "boxes.a.class",
+            "'cart' is not known",
+        ),
         (ROAD + f"boxes: {{a: {BOX.replace('1]', '0]')}}}", "boxes.a.size[2]", "0 is not above 0"),
         (ROAD + f"boxes: {{a: {BOX.replace('1]', '1, 1]')}}}", "boxes.a.size", "are not 3 numbers"),
         (ROAD + "corrections: {a: {boxes: {b: {}}}}", "corrections.a.boxes.b", "no such box"),

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from derain import InputError
-from derain.files.packaged import packaged_or_own
+from derain.files.documents import packaged_or_own
 
 
 def test_a_name_or_a_path_is_a_file_and_anything_else_is_refused(tmp_path: Path) -> None:

@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 from derain.evaluation.hard_cases import hard_cases
 from derain.recordings.evidence import (
     LARGEST_LOG_ODDS,
+    ScanPoints,
     combined_log_odds,
     ray_log_odds,
     surroundings_features,
     vote,
 )
-from derain.recordings.known_points import ScanPoints
 from derain.recordings.rays import RayEvidence, ray_evidence
 from derain.scan import Scan
 

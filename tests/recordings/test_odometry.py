@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from derain.files import read_scan
-from derain.recordings.odometry import Odometry
-from derain.recordings.registration import (
+from derain.recordings.odometry import (
     FEWEST_USUAL,
     LARGEST_CHANGE,
     LARGEST_TURN,
@@ -18,6 +17,7 @@ from derain.recordings.registration import (
     MOST_APART,
     TIMES_THE_USUAL,
     WELL_ENOUGH,
+    Odometry,
     Registration,
     Trust,
     shift_of,

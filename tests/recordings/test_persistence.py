@@ -195,12 +195,12 @@ def test_hard_cases_are_answered() -> None:
 @pytest.mark.parametrize(
     ("parameters", "told"),
     [
-        ({"before": -1}, "before is -1"),
-        ({"after": 51}, "after is 51"),
-        ({"before": 1.5}, "before is 1.5"),
-        ({"before": True}, "before is True"),
-        ({"sure": 0.5}, "sure is 0.5"),
-        ({"sure": "much"}, "sure is"),
+        ({"before": -1}, "before: -1 is not"),
+        ({"after": 51}, "after: 51 is not"),
+        ({"before": 1.5}, "before: 1.5 is not"),
+        ({"before": True}, "before: True is not"),
+        ({"sure": 0.5}, "sure: 0.5 is not"),
+        ({"sure": "much"}, "sure: 'much' is not"),
         ({"reach": 3}, "it has no parameter reach. It has before, after, sure."),
     ],
 )

@@ -9,9 +9,8 @@ import pytest
 
 from derain.errors import InputError
 from derain.files import write_scan
-from derain.recordings.odometry import FrameOdometry
+from derain.recordings.odometry import FrameOdometry, Registration, shift_of
 from derain.recordings.posed import with_poses
-from derain.recordings.registration import Registration, shift_of
 from derain.scan import Scan
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame, MemoryFrame

@@ -6,7 +6,7 @@ from window_method import Between, Dimmer
 from derain.errors import InputError
 from derain.export.methods import load_method, load_method_of_one_scan
 from derain.export.runtimes.session import Runtime
-from derain.recordings.registry import METHODS
+from derain.recordings.recording_method import METHODS
 
 
 @pytest.fixture
