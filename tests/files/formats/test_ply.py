@@ -127,20 +127,23 @@ TRIANGLES = [(0, 1, 2), (2, 3, 4), (5, 4, 3), (1, 3, 5)]
 
 
 def mesh(faces: list[tuple[int, ...]], encoding: str, behind: str = "") -> bytes:
-    """A file of POINTS and of faces, each with a quality before and a colour behind its list."""
+    """A file of POINTS and of faces, each with a quality and a colour behind its list."""
     lines = [
         *("ply", f"format {encoding} 1.0", "element vertex 6"),
         *(f"property float {axis}" for axis in "xyz"),
-        *(f"element face {len(faces)}", "property float quality"),
-        *("property list uchar int vertex_indices", "property uchar red", behind, "end_header"),
+        *(f"element face {len(faces)}", "property list uchar int vertex_indices"),
+        *("property float quality", "property uchar red", behind, "end_header"),
     ]
     header = "".join(f"{line}\n" for line in lines if line).encode()
-    rows = [(0.5 * place, len(face), *face, place) for place, face in enumerate(faces)]
+    rows = [(len(face), *face, 0.5 * place, place) for place, face in enumerate(faces)]
     if encoding == "ascii":
-        text = [*POINTS.astype(int).tolist(), *([f"{row[0]:g}", *row[1:]] for row in rows)]
+        text = [
+            *POINTS.astype(int).tolist(),
+            *([*row[:-2], f"{row[-2]:g}", row[-1]] for row in rows),
+        ]
         return header + "".join(" ".join(map(str, line)) + "\n" for line in text).encode()
     order = BYTE_ORDERS[encoding]
-    data = [struct.pack(f"{order}fB{len(row) - 3}iB", *row) for row in rows]
+    data = [struct.pack(f"{order}B{len(row) - 3}ifB", *row) for row in rows]
     return header + POINTS.astype(f"{order}f4").tobytes() + b"".join(data)
 
 
@@ -160,7 +163,7 @@ def test_a_mesh_that_loses_nothing_comes_back_byte_for_byte(tmp_path: Path, enco
 
 
 @pytest.mark.parametrize("encoding", BYTE_ORDERS)
-def test_faces_of_vertices_that_stay_are_renumbered(
+def test_listedof_vertices_that_stay_are_renumbered(
     tmp_path: Path, encoding: str, open3d: Any
 ) -> None:
     path = tmp_path / "mesh.ply"
@@ -177,14 +180,14 @@ def test_faces_of_vertices_that_stay_are_renumbered(
     assert read_scan(path).header.faces.table["red"].tolist() == [1, 2]
 
 
-def test_faces_follow_vertices_in_any_order_and_the_first_of_those_taken_twice(
+def test_listedfollow_vertices_in_any_order_and_the_first_of_those_taken_twice(
     tmp_path: Path,
 ) -> None:
     path = tmp_path / "mesh.ply"
     path.write_bytes(mesh(TRIANGLES, "ascii"))
     scan = read_scan(path)
     for rows, lines in (
-        ([5, 3, 1], ["1.5 3 2 1 0 3"]),
+        ([5, 3, 1], ["3 2 1 0 1.5 3"]),
         ([*range(6), *range(6)[::-1]], mesh(TRIANGLES, "ascii").decode().splitlines()[-4:]),
     ):
         write_scan(path, scan.take(np.array(rows)))
@@ -197,7 +200,7 @@ def test_faces_follow_vertices_in_any_order_and_the_first_of_those_taken_twice(
     [([*TRIANGLES, (0, 1, 2, 3)], 0), ([(0, 1, 6)], 0), ([(0, 1, -1)], 0), (TRIANGLES, 12)],
     ids=["mixed", "far", "minus", "cut off"],
 )
-def test_faces_that_cannot_follow_are_left_out_and_said_to_be(
+def test_listedthat_cannot_follow_are_left_out_and_said_to_be(
     tmp_path: Path, encoding: str, faces: list[tuple[int, ...]], cut: int
 ) -> None:
     path = tmp_path / "mesh.ply"
