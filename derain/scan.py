@@ -149,8 +149,9 @@ class Scan:
         """
         if isinstance(points, Scan):
             return points
-        if isinstance(points, str | Path):
-            raise InputError(points, "a path is not an array of points", "Use derain.read_scan.")
+        given: object = points  # whatever a user gave
+        if isinstance(given, str | Path):
+            raise InputError(given, "a path is not an array of points", "Use derain.read_scan.")
         remedy = "Give an array of shape (N, 4): a row for each point."
         try:
             array = np.asarray(points)

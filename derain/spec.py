@@ -97,11 +97,6 @@ class Spec:
         return spec
 
     @property
-    def mean_intensity(self) -> float:
-        """Mean intensity of the training points; 0 for a network that sees none."""
-        return self.means.get("intensity", 0.0)
-
-    @property
     def intensity_unit(self) -> str:
         """Unit of the training data's intensity."""
         return dict(zip(self.channels, self.units, strict=True)).get("intensity", "not used")
@@ -123,9 +118,8 @@ class Spec:
         """
         yield from viewpoint_issues(scan)
         yield from missing_channels(scan, self.missing_channels(scan), self.data)
-        yield from intensity_unlike_training(
-            scan, self.mean_intensity, self.intensity_unit, self.data
-        )
+        mean = self.means.get("intensity", 0.0)  # 0 for a network that sees none
+        yield from intensity_unlike_training(scan, mean, self.intensity_unit, self.data)
         if self.weighs_intensity and "intensity" not in self.channels:
             yield from missing_intensity(scan, "rain is found by geometry alone, and less of it")
 

@@ -86,7 +86,7 @@ def test_both_parts_are_had_back(ars548: Scan, shared: Path) -> None:
     assert len(fused) == len(lidar) + 308
     np.testing.assert_array_equal(fused.xyz[~fused.radar], lidar.xyz)
     np.testing.assert_array_equal(fused.intensity[~fused.radar], lidar.intensity)
-    back = PLACE.inverse(fused.xyz[fused.radar])
+    back = Extrinsics(np.linalg.inv(PLACE.matrix))(fused.xyz[fused.radar])
     np.testing.assert_allclose(back, ars548.xyz, atol=1e-4)
     for name in ("doppler", "rcs"):
         np.testing.assert_array_equal(fused.fields[name][fused.radar], ars548.fields[name])

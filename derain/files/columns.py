@@ -117,16 +117,12 @@ def columns_of(scan: Scan) -> dict[str, NDArray[Any]]:
         scan made in memory. Coordinates held in one `xyz` array come out as x, y and z, which every
         format can hold.
     """
-    fields: dict[str, NDArray[Any]] = dict(scan.fields)
-    if not fields:
-        fields["xyz"] = scan.xyz
-        if scan.intensity is not None:
-            fields["intensity"] = scan.intensity
+    of_memory = {"xyz": scan.xyz, "intensity": scan.intensity}
     columns: dict[str, NDArray[Any]] = {}
-    for name, column in fields.items():
-        if name == "xyz":
+    for name, column in (scan.fields or of_memory).items():
+        if name == "xyz" and column is not None:
             columns |= {axis: column[:, place] for place, axis in enumerate("xyz")}
-        else:
+        elif column is not None:
             columns[name] = column
     return columns
 

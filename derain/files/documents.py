@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 import yaml
 
 from derain.errors import InputError, did_you_mean
-from derain.files.reading import is_file, reading
+from derain.files.reading import is_file, read_bytes, reading
 
 # Far more than any card, scene or Spec takes, and read in a second.
 LARGEST_DOCUMENT = 2**20
@@ -108,13 +108,13 @@ class Entry:
                 or is not YAML.
         """
         with reading(path, *_YAML_DAMAGE):
-            return cls(path, "", parsed_yaml(_text(path, largest), largest))
+            return cls(path, "", parsed_yaml(read_bytes(path, largest).decode("utf-8"), largest))
 
     @classmethod
     def of_json_file(cls, path: Path, largest: int = LARGEST_DOCUMENT) -> "Entry":
         """The whole of a JSON file; arguments and errors as for :meth:`of_yaml`."""
         with reading(path, ValueError):
-            text = _text(path, largest)
+            text = read_bytes(path, largest).decode("utf-8")
         return cls.of_json(text, path, largest)
 
     @classmethod
@@ -301,14 +301,6 @@ def shown(value: Any) -> str:
 def short(text: str) -> str:
     """A text as a message shows it, without quotes and cut where it is long."""
     return text if len(text) <= 60 else f"{text[:57]}..."
-
-
-def _text(path: Path, largest: int) -> str:
-    with path.open("rb") as file:
-        content = file.read(largest + 1)
-    if len(content) > largest:
-        raise ValueError(f"more than {largest:,} bytes")
-    return content.decode("utf-8")
 
 
 def _refuse_depth(value: Any, depth: int = 0) -> None:

@@ -59,11 +59,6 @@ class Extrinsics:
         matrix[:3, 3] = x, y, z
         return cls(matrix)
 
-    @property
-    def inverse(self) -> "Extrinsics":
-        """The motion back."""
-        return Extrinsics(np.linalg.inv(self.matrix).astype(np.float64))
-
     def __call__(self, xyz: NDArray[np.float32]) -> NDArray[np.float32]:
         """Moves points, float32 (N, 3), metres."""
         return to_float32(xyz @ self.matrix[:3, :3].T + self.matrix[:3, 3])

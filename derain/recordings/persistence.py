@@ -172,8 +172,9 @@ class PersistenceDerainer(RecordingMethod):
             alone = combined_log_odds(points, evidence)
             agreed = vote(points, alone)
             sure = np.log(self.persistence.sure)
-            known = (evidence is not None) & (np.minimum(agreed, alone) > sure)
-            known |= (evidence is not None) & (np.maximum(agreed, alone) < -sure)
+            surely_rain = (alone > sure) & (agreed > sure)
+            surely_solid = (alone < -sure) & (agreed < -sure)
+            known = (surely_rain | surely_solid) & (evidence is not None)
         with stopwatch.stage("back"):
             judgement = _by_row(scan, points, agreed, known, ready.frame)
         return self.with_warnings(judgement)

@@ -57,8 +57,3 @@ def test_an_id_that_needs_more_than_16_bits_is_not_written(tmp_path: Path, label
         with pytest.raises(InputError, match="outside 0 to 65535"):
             write_labels(tmp_path / "scan.label", *halves)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_another_number_of_instances_than_classes_is_not_written(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="2 instances for 3 classes"):
-        write_labels(tmp_path / "scan.label", np.zeros(3, np.int64), np.zeros(2, np.int64))

@@ -302,8 +302,10 @@ def _read_faces(
         numbers of vertices, of vertices that are not there, whose vertices are not their first
         property, or cut off.
     """
-    vertices, *others = element.properties or [None]
-    if vertices is None or vertices.name not in _LISTS or any(each.length for each in others):
+    if not element.properties:
+        return None
+    vertices, *others = element.properties
+    if vertices.name not in _LISTS or any(each.length for each in others):
         return None
     kinds = vertices.kind[0], (vertices.length or "")[:1]
     if not set(kinds) <= {"i", "u"}:  # whole numbers, and a whole number of them
