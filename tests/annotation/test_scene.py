@@ -13,7 +13,6 @@ from derain.annotation.scene import (
     Correction,
     Rectangle,
     Scene,
-    inside,
     read_scene,
 )
 from derain.errors import InputError
@@ -50,15 +49,6 @@ def test_the_faces_of_a_box_are_part_of_it() -> None:
     faces = np.array([[1, 0, 0], [0, 2, 0], [0, 0, 3], [1, 2, 3]], float)
     assert box.contains(faces).all()
     assert not box.contains(np.nextafter(faces, np.inf)).any()
-
-
-def test_a_bent_road_holds_what_lies_in_one_of_its_parts() -> None:
-    bend = ((0, 0), (10, 0), (10, 10), (8, 10), (8, 2), (0, 2))
-    points = np.random.default_rng(0).uniform(-2, 12, (2000, 3))
-    x, y, _ = points.T
-    first = (x > 0) & (x < 10) & (y > 0) & (y < 2)
-    second = (x > 8) & (x < 10) & (y > 0) & (y < 10)
-    assert np.array_equal(inside(bend, points), first | second)
 
 
 SCENE = Scene(
@@ -121,10 +111,8 @@ def test_corrections_hold_in_their_sequence_and_change_what_they_state_alone() -
         ("boxes: {}", "", "road is missing"),
         (ROAD + "roof: 1", "roof", "there is no such key"),
         ("road: [[0, 0], [1, 0]]", "road", "2 corners make no polygon"),
-        ("road: [[0, 0], [1, 0], [0, .nan]]", "road[2][1]", "nan is not a finite number"),
         ("road: [[0, 0], [1, 0], [0, 1, 2]]", "road[2]", "are not 2 numbers"),
         ("road: [[0, 0], [1, 0], [0, 1e300]]", "road[2][1]", "1e+300 is not within"),
-        (ROAD + "height: -1e300", "height", "-1e+300 is not within"),
         (ROAD + "boxes: {a: {class: car}}", "boxes.a", "centre is missing"),
         (
             ROAD + f"boxes: {{a: {BOX.replace('car', 'cart')}}}",
@@ -132,7 +120,6 @@ def test_corrections_hold_in_their_sequence_and_change_what_they_state_alone() -
             "'cart' is not known",
         ),
         (ROAD + f"boxes: {{a: {BOX.replace('1]', '0]')}}}", "boxes.a.size[2]", "0 is not above 0"),
-        (ROAD + f"boxes: {{a: {BOX.replace('1]', '1, 1]')}}}", "boxes.a.size", "are not 3 numbers"),
         (ROAD + "corrections: {a: {boxes: {b: {}}}}", "corrections.a.boxes.b", "no such box"),
     ],
 )

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 from derain.annotation.scene import Box, Scene
 from derain.annotation.steps import MOST_POINTS, Plane, annotate, road_plane
 from derain.errors import InputError
-from derain.evaluation.hard_cases import hard_cases
 from derain.fusion import UNKNOWN
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass
@@ -119,11 +118,3 @@ def test_all_points_together_are_labelled_as_each_alone() -> None:
     together = annotate(Scan(points.astype(np.float32)), SCENE, PLANE)
     assert together.tolist() == [label_of(*point) for point in points.astype(np.float32)]
     assert set(together) >= {0, 1, 2, 3, 7}
-
-
-def test_every_row_of_a_hard_case_gets_a_class() -> None:
-    for name, scan in hard_cases(500):
-        label = annotate(scan, SCENE, PLANE)
-        assert label.shape == (len(scan),), name
-        assert set(label[scan.valid]) <= {*TrackClass, UNKNOWN}, name
-        assert (label[~scan.valid] == UNKNOWN).all(), name

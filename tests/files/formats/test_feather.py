@@ -8,7 +8,6 @@ import pyarrow
 import pytest
 from pyarrow import feather
 
-from derain import InputError
 from derain.files import read_scan, write_scan
 
 COMPRESSIONS = ("uncompressed", "lz4", "zstd")
@@ -68,16 +67,3 @@ def test_columns_that_were_changed_are_written_and_others_kept(
     assert copy["x"].to_pylist() == [0.0] * 7
     assert copy["new"].to_pylist() == [1] * 7
     assert copy.drop(["x", "new"]).equals(table.drop(["x"]))
-
-
-def test_what_is_no_feather_of_points_is_refused(tmp_path: Path, table: pyarrow.Table) -> None:
-    path = tmp_path / "scan.feather"
-    feather.write_feather(table, str(path))
-    content = path.read_bytes()
-    for damaged in (b"", b"FEA1" + content, content[:500], b"ARROW1\0\0" + content[500:]):
-        path.write_bytes(damaged)
-        with pytest.raises(InputError, match=r"cannot be read as \.feather"):
-            read_scan(path)
-    feather.write_feather(table.drop(["z"]), str(path))
-    with pytest.raises(InputError, match="has no x, y and z among its columns"):
-        read_scan(path)

@@ -54,15 +54,12 @@ def binary(order: str) -> bytes:
     return b"".join(struct.pack(f"{order}ffdB", *vertex) for vertex in vertices) + faces
 
 
-def test_text_is_read(file: Path) -> None:
-    check_points(read_scan(write(file, HEADER, DATA)))
-    check_points(read_scan(write(file, HEADER.replace("\n", "\r\n"), DATA)))
-
-
-@pytest.mark.parametrize("encoding", ["binary_little_endian", "binary_big_endian"])
-def test_both_byte_orders_are_read(file: Path, encoding: str) -> None:
-    data = binary(BYTE_ORDERS[encoding])
-    check_points(read_scan(write(file, HEADER.replace("ascii", encoding), data)))
+@pytest.mark.parametrize("encoding", BYTE_ORDERS)
+def test_every_encoding_is_read(file: Path, encoding: str) -> None:
+    header = HEADER.replace("ascii", encoding)
+    data = DATA if encoding == "ascii" else binary(BYTE_ORDERS[encoding])
+    check_points(read_scan(write(file, header, data)))
+    check_points(read_scan(write(file, header.replace("\n", "\r\n"), data)))
 
 
 def test_elements_before_the_vertices_are_passed_over(file: Path) -> None:
@@ -76,11 +73,9 @@ def test_elements_before_the_vertices_are_passed_over(file: Path) -> None:
 def test_a_cleaned_cloud_keeps_its_comments(file: Path) -> None:
     scan = read_scan(write(file, HEADER, DATA))
     write_scan(file, scan.take(np.array([True, False])))
-    assert (
-        "comment made by händ\n".encode() + b"obj_info two points\nelement vertex 1\n"
-        in file.read_bytes()
-    )
-    assert read_scan(file).xyz.tolist() == [[1.5, -2.0, np.float32(0.1)]]
+    assert file.read_text("utf-8").splitlines()[2:5] == [
+        "comment made by händ", "obj_info two points", "element vertex 1"
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("encoding", BYTE_ORDERS)
@@ -100,18 +95,13 @@ def test_open3d_reads_what_is_written(file: Path, scan: Scan, encoding: str, ope
         (HEADER, b""),
         (HEADER, b"1 2 3 4\n5 6 7\n"),
         (HEADER, b"1 2 3 4\n5 6 7 256\n"),
-        (HEADER, b"1 2 3 4\n5 6 seven 8\n"),
         (HEADER.replace("ascii", "binary_little_endian"), binary("<")[:33]),
         (HEADER.replace("vertex 2", "vertex 99999999999999999999"), DATA),
-        (HEADER.replace("vertex 2", "vertex -2"), DATA),
         (HEADER.replace("vertex 2", "points 2"), DATA),
         ("ply\nformat ascii 1.0\nelement vertex 2\nend_header\n", DATA),
-        ("ply\nformat binary_big_endian 1.0\nelement vertex 2\nend_header\n", DATA),
         (HEADER.replace("format ascii 1.0\n", ""), DATA),
         (HEADER.replace("format ascii 1.0", "format ascii 2.0"), DATA),
         (HEADER.replace("uchar intensity", "complex intensity"), DATA),
-        (HEADER.replace("float32 y", "float32 x"), DATA),
-        (HEADER.replace("element vertex 2\n", ""), DATA),
         (HEADER.replace("end_header\n", ""), DATA),
         (HEADER.replace("uchar intensity", "list uchar int echoes"), DATA),
         (HEADER.replace("ply", "obj"), DATA),
@@ -160,10 +150,15 @@ def test_a_mesh_that_loses_nothing_comes_back_byte_for_byte(tmp_path: Path, enco
     assert left_out(path) == ()
     write_scan(tmp_path / "copy.ply", read_scan(path))
     assert (tmp_path / "copy.ply").read_bytes() == path.read_bytes()
+    more = mesh(TRIANGLES, encoding, "element edge 1\nproperty uchar vertex1")
+    path.write_bytes(more + (b"3\n" if encoding == "ascii" else b"3"))
+    assert left_out(path) == ("edge",)
+    write_scan(path, read_scan(path))
+    assert path.read_bytes() == mesh(TRIANGLES, encoding)
 
 
 @pytest.mark.parametrize("encoding", BYTE_ORDERS)
-def test_listedof_vertices_that_stay_are_renumbered(
+def test_faces_of_vertices_that_stay_are_renumbered(
     tmp_path: Path, encoding: str, open3d: Any
 ) -> None:
     path = tmp_path / "mesh.ply"
@@ -180,7 +175,7 @@ def test_listedof_vertices_that_stay_are_renumbered(
     assert read_scan(path).header.faces.table["red"].tolist() == [1, 2]
 
 
-def test_listedfollow_vertices_in_any_order_and_the_first_of_those_taken_twice(
+def test_faces_follow_vertices_in_any_order_and_the_first_of_those_taken_twice(
     tmp_path: Path,
 ) -> None:
     path = tmp_path / "mesh.ply"
@@ -198,9 +193,8 @@ def test_listedfollow_vertices_in_any_order_and_the_first_of_those_taken_twice(
 @pytest.mark.parametrize(
     ("faces", "cut"),
     [([*TRIANGLES, (0, 1, 2, 3)], 0), ([(0, 1, 6)], 0), ([(0, 1, -1)], 0), (TRIANGLES, 12)],
-    ids=["mixed", "far", "minus", "cut off"],
 )
-def test_listedthat_cannot_follow_are_left_out_and_said_to_be(
+def test_faces_that_cannot_follow_are_left_out_and_said_to_be(
     tmp_path: Path, encoding: str, faces: list[tuple[int, ...]], cut: int
 ) -> None:
     path = tmp_path / "mesh.ply"
@@ -210,11 +204,3 @@ def test_listedthat_cannot_follow_are_left_out_and_said_to_be(
     write_scan(path, read_scan(path))
     assert b"face" not in path.read_bytes()
     np.testing.assert_array_equal(read_scan(path).xyz, POINTS)
-
-
-def test_other_elements_are_said_to_be_left_out(tmp_path: Path) -> None:
-    path = tmp_path / "mesh.ply"
-    path.write_bytes(mesh(TRIANGLES, "ascii", "element edge 1\nproperty int vertex1") + b"3\n")
-    assert left_out(path) == ("edge",)
-    write_scan(path, read_scan(path))
-    assert path.read_bytes() == mesh(TRIANGLES, "ascii")
