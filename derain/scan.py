@@ -79,9 +79,9 @@ class Scan:
             in memory.
         shape: (height, width) of an organised cloud, rows in row-major order; else None.
         name: Where the scan came from, for messages.
-        header: What the file says besides its columns, such as the encoding of a PCD. Only the
+        header: The content of the file besides its columns, such as the encoding of a PCD. Only the
             writer of the same format looks into it. One that speaks of single points is a
-            PointHeader, one that says what will not be written a PartialHeader.
+            PointHeader, one with parts that are not written a PartialHeader.
 
     Raises:
         InputError: Columns of different lengths, of another shape or without numbers; class ids
@@ -186,14 +186,14 @@ class Scan:
         alike = len(values) >= FEWEST_ALIKE and values.min() == values.max()
         return None if alike else self.intensity
 
-    @cached_property  # whatever looks at a scan asks for it
+    @cached_property  # whatever looks at a scan needs it
     def valid(self) -> NDArray[np.bool_]:
         """True for the points that can be judged, bool (N,), read-only.
 
         Not valid: coordinates or intensity not finite or beyond any sensor's reach, points exactly
         at the origin (no return), and cells that hold −1 in every column (no return in
-        SemanticKITTI-style range images). A column of intensity without one finite value tells
-        nothing of any point.
+        SemanticKITTI-style range images). A column of intensity without one finite value
+        counts for no point.
         """
         # Column by column, which is several times faster than along the short axis. A comparison
         # with NaN is False, so the bounds refuse NaN and infinity as well.

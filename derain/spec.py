@@ -37,7 +37,7 @@ class Spec:
         channels: Its input channels, in order.
         units: Their units.
         mean: Mean of each channel over the training points; it stands in for values that a scan
-            lacks, about which it says least.
+            lacks.
         std: Standard deviation of each channel over the training points.
         classes: Names of the training data's semantic classes, by id.
         rain: Ids of those that count as rain.
@@ -46,7 +46,7 @@ class Spec:
         data: Name of the training data.
         licence: Licence of the training data.
         candidates: Bounds outside which it calls nothing rain; None where it judges every point.
-        training: What it was trained on, as `derain.sources.training_record` says it: names of
+        training: What it was trained on, by `derain.sources.training_record`: names of
             sequences, fingerprints of scans. Empty where that is not known.
         schema: Version of this layout.
     """
@@ -150,7 +150,7 @@ def _view_of(entry: Entry, spec: Spec, threads: int = 0) -> View:
 
 
 def _refuse_newer(entry: Entry) -> None:
-    """Refuses a Spec of a later layout, of which nothing else can be said."""
+    """Refuses a Spec of a later layout, before anything else of it is read."""
     schema = entry.members().get("schema")
     if schema is not None and isinstance(schema.value, int) and schema.value > SCHEMA:
         raise entry.fault(

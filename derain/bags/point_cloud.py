@@ -260,8 +260,6 @@ def scan_of_cloud(name: Path, cloud: PointCloud) -> Scan:
         column = named(columns, axis, name)
         if column is not None and (column.ndim > 1 or column.dtype.kind != "f"):
             count = f" of {column.shape[1]} values" if column.ndim > 1 else ""
-            raise ValueError(
-                f"{axis} is {column.dtype}{count}, of which nobody says how many make a metre"
-            )
+            raise ValueError(f"{axis} is {column.dtype}{count}, whose unit is not known")
     shape = (cloud.height, cloud.width) if cloud.is_organised and len(cloud) else None
     return scan_of(name, columns, shape)

@@ -57,7 +57,7 @@ def read_scan(path: Path | str, columns: Sequence[str] = DEFAULT_COLUMNS) -> Sca
 
 
 def count_points(path: Path, columns: Sequence[str] = DEFAULT_COLUMNS) -> int:
-    """Number of points of a scan, which is read only where the size of its file does not tell.
+    """Number of points of a scan, which is read only where its file's size is not enough.
 
     Args:
         path: As for :func:`read_scan`.

@@ -63,7 +63,7 @@ def scan_of(
             points of the radar) if there are; and whatever else the file holds. A name in
             another case counts where no column has exactly this one.
         shape: (height, width) of an organised cloud.
-        header: What the file says besides its columns, for the writer of its format.
+        header: The content of the file besides its columns, for the writer of its format.
 
     Raises:
         InputError: No coordinates, coordinates that are not numbers, or columns of which several

@@ -80,7 +80,7 @@ _SHORT.maxlevel, _SHORT.maxstring, _SHORT.maxother = 2, 60, 60
 
 @dataclass(frozen=True)
 class Entry:
-    """A value of a document that knows where it stands, so that what is wrong with it can be said.
+    """A value of a document that knows its place, so that an error can name it.
 
     Every method raises InputError for a value of another kind than it reads; the message has the
     document and the key.
@@ -142,7 +142,7 @@ class Entry:
         return cls(source, "", value)
 
     def fault(self, reason: str, remedy: str) -> InputError:
-        """The error that says what is wrong here."""
+        """The error of a wrong value here."""
         return InputError(
             f"{self.source}: {short(self.key)}" if self.key else self.source, reason, remedy
         )
@@ -312,7 +312,7 @@ def _refuse_depth(value: Any, depth: int = 0) -> None:
 
 
 def parsed_yaml(text: str, largest: int = LARGEST_DOCUMENT, aliases: bool = False) -> Any:
-    """What a text in YAML says.
+    """The value of a text in YAML.
 
     Args:
         text: The text.

@@ -73,7 +73,7 @@ def read_extrinsics(path: Path) -> Extrinsics:
             points of the sensor into the other frame.
 
     Raises:
-        InputError: A file that is missing or says something else, or a motion that is not rigid.
+        InputError: A file that is missing or has other keys, or a motion that is not rigid.
     """
     document = Entry.of_yaml(path)
     values = document.members()

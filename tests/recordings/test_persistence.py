@@ -187,13 +187,6 @@ def test_wrong_parameters_are_refused(parameters: dict[str, object], told: str) 
     assert told in str(refused.value)
 
 
-def test_what_it_says_of_itself_makes_it_again() -> None:
-    content = PersistenceDerainer(Persistence(before=2, sure=9.0)).as_dict()
-    again = load_method(content.pop("method"), content)
-    assert isinstance(again, PersistenceDerainer)
-    assert again.persistence == Persistence(before=2, sure=9.0)
-
-
 def test_real_snow_is_found_by_free_space(shared: Path) -> None:
     from derain.cards.card import load_card
     from derain.sources.reader import FrameReader
@@ -218,3 +211,5 @@ def test_it_can_be_pickled_and_begins_a_recording_of_its_own() -> None:
     method.push(scene(100))
     again = pickle.loads(pickle.dumps(method))
     assert (again.persistence, again.threads, again.waiting) == (method.persistence, 1, 0)
+    content = method.as_dict()
+    assert load_method(content.pop("method"), content).persistence == method.persistence

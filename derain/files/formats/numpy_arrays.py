@@ -149,7 +149,7 @@ class Npz(Format):
 
 
 def _array(data: bytes) -> NDArray[Any]:
-    """The array of a .npy file, if the file is as long as its header says."""
+    """The array of a .npy file, if the file is as long as its header states."""
     file = io.BytesIO(data)
     # The third version differs from the second in the encoding of names alone.
     read_header = (

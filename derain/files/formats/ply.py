@@ -132,7 +132,7 @@ class Faces:
 
 @dataclass(frozen=True)
 class PlyHeader:
-    """What a PLY file says besides its vertices.
+    """The content of a PLY file besides its vertices.
 
     Attributes:
         encoding: One of BYTE_ORDERS.
@@ -205,7 +205,7 @@ class Ply(Format):
 
 
 def _parse(content: bytes) -> tuple[PlyHeader, NDArray[Any]]:
-    """What a file says besides its vertices, and the vertices, structured (N,)."""
+    """The content of a file besides its vertices, and the vertices, structured (N,)."""
     encoding, comments, elements, data = _parse_header(content)
     names = [element.name for element in elements]
     if "vertex" not in names:
@@ -224,14 +224,14 @@ def _parse(content: bytes) -> tuple[PlyHeader, NDArray[Any]]:
 
 
 def _parse_header(content: bytes) -> tuple[str, tuple[str, ...], list[Element], bytes]:
-    """What the header of a file says.
+    """The parts of a file's header.
 
     Returns:
         The encoding; lines of comments and object information; the elements in the file's order;
         and the data behind it.
 
     Raises:
-        ValueError: A header that is missing, incomplete or says what no PLY can mean.
+        ValueError: A header that is missing, incomplete or contradictory.
     """
     end = _END.search(content, 0, LARGEST_HEADER)
     if end is None or not content.startswith(b"ply"):

@@ -196,5 +196,5 @@ def test_data_that_do_not_match_the_header_are_refused(
 )
 def test_headers_that_make_no_sense_are_refused(file: Path, old: str, new: str) -> None:
     assert old in HEADER
-    with pytest.raises(InputError, match=r"read as \.pcd \(the header (says|has no) "):
+    with pytest.raises(InputError, match=r"read as \.pcd \(the header (states|has no) "):
         read_scan(write(file, HEADER.replace(old, new), DATA))
