@@ -73,8 +73,8 @@ def test_a_radar_that_knows_its_labels_keeps_them() -> None:
     assert fused.label[10:].tolist() == [1, 2, 3]
     assert fused.intensity is not None
     assert fused.intensity[10:].tolist() == [1, 2, 3]
-    found = fuse(lidar, radar, HERE, label_within=10).label
-    np.testing.assert_array_equal(found[10:], transfer_labels(lidar, radar.xyz, within=10))
+    found = fuse(lidar, radar, HERE, label_within=1000).label
+    np.testing.assert_array_equal(found[10:], transfer_labels(lidar, radar.xyz, within=1000))
     with pytest.raises(InputError, match="it has no labels"):
         transfer_labels(radar, lidar.xyz)
 

@@ -8,6 +8,7 @@ import pyarrow
 import pytest
 from pyarrow import feather
 
+from derain.errors import InputError
 from derain.files import read_scan, write_scan
 
 COMPRESSIONS = ("uncompressed", "lz4", "zstd")
@@ -67,3 +68,10 @@ def test_columns_that_were_changed_are_written_and_others_kept(
     assert copy["x"].to_pylist() == [0.0] * 7
     assert copy["new"].to_pylist() == [1] * 7
     assert copy.drop(["x", "new"]).equals(table.drop(["x"]))
+
+
+def test_version_1_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "scan.feather"
+    path.write_bytes(b"FEA1" + bytes(100))
+    with pytest.raises(InputError, match="version 2"):
+        read_scan(path)

@@ -140,3 +140,11 @@ def test_a_further_column_becomes_an_extra_dimension(tmp_path: Path, suffix: str
     # The scan is as it was, and so is what is written of it.
     write_scan(tmp_path / f"copy{suffix}", scan)
     assert (tmp_path / f"copy{suffix}").read_bytes() == path.read_bytes()
+
+
+def test_fewer_points_than_the_header_states_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "scan.las"
+    survey = write(path, STREET, version="1.2")
+    path.write_bytes(path.read_bytes()[: -survey.header.point_format.size])
+    with pytest.raises(InputError, match=r"cannot be read as \.las"):
+        read_scan(path)

@@ -204,3 +204,5 @@ def test_faces_that_cannot_follow_are_left_out_and_said_to_be(
     write_scan(path, read_scan(path))
     assert b"face" not in path.read_bytes()
     np.testing.assert_array_equal(read_scan(path).xyz, POINTS)
+    path.write_bytes(mesh(TRIANGLES, encoding).replace(b"uchar int vertex", b"uchar float vertex"))
+    assert left_out(path) == ("face",)

@@ -82,6 +82,7 @@ def test_names_alone_or_nothing_are_a_scan_of_no_points(file: Path, text: str, l
     ("text", "reason"),
     [
         ("x,y,z\n1,2,3\n\n1,2\n", "line 4 has 2 values for 3 columns"),
+        ("x,y,z\n1,2,3,4\n", "line 2 has 4 values for 3 columns"),
         ("x,y,z\n\n1,2,3\n1,tree,3\n", "line 4: y is 'tree', not a number"),
         ("x,y,z\n1,2,3#4\n", "line 2: z is '3#4', not a number"),
         ("x,y,z,x \n1,2,3,4\n", "line 1 names two columns alike: x, y, z, x"),
