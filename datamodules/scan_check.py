@@ -6,7 +6,7 @@ from typing import Any
 import lightning
 from lightning.pytorch.trainer.states import TrainerFn
 
-from derain.cards.card import warn_without_rain
+from derain.cards.rain_found import warn_without_rain
 from derain.datamodules.base import Part, ScanDataModule
 from derain.sources.spread import evenly_spaced
 from derain.system.notices import Notices

@@ -8,7 +8,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from derain.cards.card import DataCard, require_rain
+from derain.cards.card import DataCard
+from derain.cards.rain_found import require_rain
 from derain.errors import InputError
 from derain.evaluation.counts import Counts
 from derain.export.onnx_file import evaluation_on_cpu

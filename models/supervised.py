@@ -6,7 +6,8 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
-from derain.cards.card import DataCard, require_rain
+from derain.cards.card import DataCard
+from derain.cards.rain_found import require_rain
 from derain.learning.batch import Batch
 from derain.learning.losses import SegmentationLoss, class_weights, segmentation_loss
 from derain.learning.task import Task, TrainingData

@@ -12,7 +12,6 @@ from derain.cards.layout import Layout
 from derain.errors import InputError
 from derain.files.documents import Entry, packaged, packaged_or_own, shown
 from derain.scan import LARGEST_ID, Scan
-from derain.system.notices import warn
 from derain.views.channels import UNITS
 
 Parsed = TypeVar("Parsed")
@@ -23,10 +22,6 @@ AutoDetect = Literal["nothing", "classes", "rain"]
 
 # What mean and std are of, in their order.
 CHANNELS_OF_STATISTICS = ("x", "y", "z", "intensity")
-
-
-# Labelled scans in which no point is rain have none, or their data card is the wrong one.
-GIVE_RAIN = "Give scans with rain, and the data card of their labels."
 
 
 @dataclass(frozen=True)
@@ -195,37 +190,6 @@ def load_card(name: str | Path) -> DataCard:
         InputError: No such card, or a file that is not one.
     """
     return _card(Entry.of_yaml(packaged_or_own(name, packaged_cards(), "data card")))
-
-
-def require_rain(found: bool, card: DataCard, subject: str | Path) -> None:
-    """Refuses to learn from labelled scans without rain.
-
-    Args:
-        found: Whether any point of the scans is rain.
-        card: Their data card.
-        subject: What messages call the scans.
-
-    Raises:
-        InputError: No point is rain.
-    """
-    if not found:
-        raise InputError(subject, _without_rain(card), GIVE_RAIN)
-
-
-def warn_without_rain(found: bool, card: DataCard) -> None:
-    """Warns where scans without rain are measured, unless the data card is one of clean data.
-
-    Args:
-        found: Whether any point of the scans is rain.
-        card: Their data card.
-    """
-    if card.rain and not found:
-        warn(f"{_without_rain(card)}: only false positives are measured. {GIVE_RAIN}")
-
-
-def _without_rain(card: DataCard) -> str:
-    rain = ", ".join(card.classes[id_] for id_ in card.rain) or "rain"
-    return f"no point of these scans is {rain} by the data card of {card.name}"
 
 
 def _card(document: Entry) -> DataCard:

@@ -8,7 +8,7 @@ from typing import Any
 import yaml
 from tqdm import tqdm
 
-from derain.cards.card import require_rain
+from derain.cards.rain_found import require_rain
 from derain.datamodules.scan_data import ScanData
 from derain.export.methods import load_method_of_one_scan
 from derain.export.runtime import Derainer

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from derain.cards.card import DataCard, load_card, warn_without_rain
+from derain.cards.card import DataCard, load_card
+from derain.cards.rain_found import warn_without_rain
 from derain.errors import reason_of
 from derain.evaluation.scores import ScoredMethod, Scoring, scorings
 from derain.export.bench.bench_entries import BenchEntry, GivenMethod, TimedMethod, bench_entries
