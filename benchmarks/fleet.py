@@ -31,7 +31,8 @@ from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.installed import DERAIN
+from benchmarks.processes import DERAIN
+
 from derain.evaluation.text_tables import markdown_table
 
 ADDRESS = "tcp://127.0.0.1:8797"

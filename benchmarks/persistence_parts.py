@@ -21,12 +21,12 @@ from derain.datamodules.base import Loading
 from derain.datamodules.labelled import named_scans
 from derain.evaluation.counts import Counts
 from derain.recordings.evidence import (
+    ScanPoints,
     combined_log_odds,
     ray_log_odds,
     surroundings_log_odds,
     vote,
 )
-from derain.recordings.known_points import ScanPoints
 from derain.recordings.posed import with_poses
 from derain.recordings.rays import RayEvidence, mean_evidence
 from derain.sources.frame import Frame

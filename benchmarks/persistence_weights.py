@@ -29,8 +29,7 @@ from derain.datamodules.base import Loading
 from derain.datamodules.labelled import named_scans
 from derain.export.recorded import DOUBTFUL
 from derain.export.runtime import Derainer
-from derain.recordings.evidence import surroundings_features
-from derain.recordings.known_points import ScanPoints
+from derain.recordings.evidence import ScanPoints, surroundings_features
 from derain.recordings.rays import RayEvidence, mean_evidence
 from derain.sources.frame import Frame
 from derain.sources.recordings import recordings_of

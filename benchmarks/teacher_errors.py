@@ -20,7 +20,7 @@ import numpy as np
 import torch
 from lightning.pytorch.callbacks import ModelCheckpoint
 
-from derain.annotation.labelling import (
+from derain.annotation.teach import (
     TAUGHT_CARD,
     TAUGHT_NOT_RAIN,
     TAUGHT_RAIN,

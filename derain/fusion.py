@@ -78,7 +78,7 @@ def fuse(
         channels: Fields of the radar frame to carry along, such as doppler and rcs.
 
     Returns:
-        The rows of the LiDAR in their order, then those of the radar in theirs, told apart by
+        The rows of the LiDAR in their order, then those of the radar in theirs, distinguished by
         `Scan.radar`; rows that cannot be judged are as they were. Intensity is 0 where the source
         has none. A file of it has the columns of REHEARSE-3D: x, y, z and intensity; with channels
         also ``radar`` (1 or 0) and each of them, float32, NaN for the LiDAR.
@@ -130,13 +130,13 @@ def transfer_labels(
     # Only the first row at each position is searched: of several rows that are equally near, a
     # kd-tree may find any.
     source, _ = distinct_rows(labelled)
-    asked = np.flatnonzero(Scan(xyz).valid)
-    if len(source) and len(asked):
+    valid = np.flatnonzero(Scan(xyz).valid)
+    if len(source) and len(valid):
         threads = usable_cores()
         tree = small_gicp.KdTree(labelled.xyz[source].astype(np.float64), num_threads=threads)
-        nearest, squared = tree.batch_knn_search(xyz[asked].astype(np.float64), 1, threads)
+        nearest, squared = tree.batch_knn_search(xyz[valid].astype(np.float64), 1, threads)
         near = squared[:, 0] <= within**2
-        label[asked[near]] = labelled.label[source[nearest[near, 0]]]
+        label[valid[near]] = labelled.label[source[nearest[near, 0]]]
     return label
 
 

@@ -79,9 +79,9 @@ class Scan:
             in memory.
         shape: (height, width) of an organised cloud, rows in row-major order; else None.
         name: Where the scan came from, for messages.
-        header: What the file says besides its columns, such as the encoding of a PCD. Only the
+        header: The content of the file besides its columns, such as the encoding of a PCD. Only the
             writer of the same format looks into it. One that speaks of single points is a
-            PointHeader, one that says what will not be written a PartialHeader.
+            PointHeader, one with parts that are not written a PartialHeader.
 
     Raises:
         InputError: Columns of different lengths, of another shape or without numbers; class ids
@@ -110,13 +110,13 @@ class Scan:
         if any(column.flags.writeable for column in self.fields.values()):
             own = {title: _read_only(column) for title, column in self.fields.items()}
             object.__setattr__(self, "fields", own)
-        columns = {"intensity": self.intensity, "label": self.label, "radar": self.radar}
-        for title, column in columns.items():
+        columns = [("intensity", self.intensity), ("label", self.label), ("radar", self.radar)]
+        for title, column in columns:
             if column is not None and column.ndim != 1:
                 raise InputError(
                     self.name, f"{title} has shape {column.shape}", "Give one value per point."
                 )
-        for title, column in {**columns, **self.fields}.items():
+        for title, column in [*columns, *self.fields.items()]:
             if column is not None and len(column) != len(self.xyz):
                 raise InputError(
                     self.name,
@@ -149,13 +149,19 @@ class Scan:
         """
         if isinstance(points, Scan):
             return points
+        given: object = points  # whatever a user gave
+        if isinstance(given, str | Path):
+            raise InputError(given, "a path is not an array of points", "Use derain.read_scan.")
+        remedy = "Give an array of shape (N, 4): a row for each point."
         try:
             array = np.asarray(points)
         except (TypeError, ValueError, RuntimeError) as error:
             reason = f"points cannot be converted to an array ({reason_of(error)})"
-            raise InputError(name, reason, "Give an array of shape (N, 4).") from error
-        _refuse_other_shapes(points, array, name)
-        return cls(array[:, :3], array[:, 3] if array.shape[1] > 3 else None, name=name)
+            raise InputError(name, reason, remedy) from error
+        width = array.shape[1] if array.ndim == 2 else 0
+        if width < 3 or width > max(len(array), WIDEST_ARRAY):
+            raise InputError(name, f"points have shape {array.shape}", remedy)
+        return cls(array[:, :3], array[:, 3] if width > 3 else None, name=name)
 
     def __len__(self) -> int:
         return len(self.xyz)
@@ -180,14 +186,14 @@ class Scan:
         alike = len(values) >= FEWEST_ALIKE and values.min() == values.max()
         return None if alike else self.intensity
 
-    @cached_property  # whatever looks at a scan asks for it
+    @cached_property  # whatever looks at a scan needs it
     def valid(self) -> NDArray[np.bool_]:
         """True for the points that can be judged, bool (N,), read-only.
 
         Not valid: coordinates or intensity not finite or beyond any sensor's reach, points exactly
         at the origin (no return), and cells that hold −1 in every column (no return in
-        SemanticKITTI-style range images). A column of intensity without one finite value tells
-        nothing of any point.
+        SemanticKITTI-style range images). A column of intensity without one finite value
+        counts for no point.
         """
         # Column by column, which is several times faster than along the short axis. A comparison
         # with NaN is False, so the bounds refuse NaN and infinity as well.
@@ -368,21 +374,3 @@ def _read_only(array: NDArray[Any]) -> NDArray[Any]:
         array = array.copy()
         array.setflags(write=False)
     return array
-
-
-def _refuse_other_shapes(given: object, array: NDArray[Any], name: str) -> None:
-    """Refuses what is no array of points, with what the user may have meant."""
-    reason, remedy = f"points have shape {array.shape}", "Give an array of shape (N, 4) or wider."
-    match given:
-        case str() | Path():
-            reason, remedy = "a path is not an array of points", "Read it by derain.read_scan."
-        case _ if array.dtype.names:
-            reason = f"an array with the fields {', '.join(array.dtype.names)}, not of shape (N, 4)"
-            remedy = "Stack x, y, z and intensity by numpy.column_stack."
-        case _ if array.ndim == 0 and array.dtype == object:
-            reason = f"{type(given).__name__} is not an array of points"
-        case _ if array.ndim == 2 and max(len(array), WIDEST_ARRAY) < array.shape[1]:
-            remedy = "Give a point as a row, not as a column: array.T."
-        case _ if array.ndim == 2 and array.shape[1] >= 3:
-            return
-    raise InputError(str(given) if isinstance(given, str | Path) else name, reason, remedy)

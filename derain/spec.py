@@ -36,7 +36,7 @@ class Spec:
         channels: Its input channels, in order.
         units: Their units.
         mean: Mean of each channel over the training points; it stands in for values that a scan
-            lacks, about which it says least.
+            lacks.
         std: Standard deviation of each channel over the training points.
         classes: Names of the training data's semantic classes, by id.
         rain: Ids of those that count as rain.
@@ -45,7 +45,7 @@ class Spec:
         data: Name of the training data.
         licence: Licence of the training data.
         candidates: Bounds outside which it calls nothing rain; None where it judges every point.
-        training: What it was trained on, as `derain.sources.training_record` says it: names of
+        training: What it was trained on, by `derain.sources.training_record`: names of
             sequences, fingerprints of scans. Empty where that is not known.
         schema: Version of this layout.
     """
@@ -96,11 +96,6 @@ class Spec:
         return spec
 
     @property
-    def mean_intensity(self) -> float:
-        """Mean intensity of the training points; 0 for a network that sees none."""
-        return self.means.get("intensity", 0.0)
-
-    @property
     def intensity_unit(self) -> str:
         """Unit of the training data's intensity."""
         return dict(zip(self.channels, self.units, strict=True)).get("intensity", "not used")
@@ -122,9 +117,8 @@ class Spec:
         """
         yield from viewpoint_issues(scan)
         yield from missing_channels(scan, self.missing_channels(scan), self.data)
-        yield from intensity_unlike_training(
-            scan, self.mean_intensity, self.intensity_unit, self.data
-        )
+        mean = self.means.get("intensity", 0.0)  # 0 for a network that sees none
+        yield from intensity_unlike_training(scan, mean, self.intensity_unit, self.data)
         if self.weighs_intensity and "intensity" not in self.channels:
             yield from missing_intensity(scan, "rain is found by geometry alone, and less of it")
 
@@ -155,7 +149,7 @@ def _view_of(entry: Entry, spec: Spec, threads: int = 0) -> View:
 
 
 def _refuse_newer(entry: Entry) -> None:
-    """Refuses a Spec of a later layout, of which nothing else can be said."""
+    """Refuses a Spec of a later layout, before anything else of it is read."""
     schema = entry.members().get("schema")
     if schema is not None and isinstance(schema.value, int) and schema.value > SCHEMA:
         raise entry.fault(

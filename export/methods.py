@@ -14,7 +14,7 @@ from derain.files.documents import Entry
 from derain.files.reading import is_file
 from derain.filters import FILTERS, FilterDerainer, filter_from
 from derain.filters.derainer import CANDIDATES
-from derain.recordings.registry import METHODS
+from derain.recordings.recording_method import METHODS
 from derain.sources.method import Method
 from derain.views.candidates import candidates_at
 

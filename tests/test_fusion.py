@@ -25,7 +25,6 @@ from derain.scan import Scan
 
 PLACE = Extrinsics.of_pose(1.5, -0.3, -0.7, 1, -2, 3)
 HERE = Extrinsics(np.eye(4))
-ARS548 = ("x", "y", "z", "doppler", "rcs", "range", "azimuth", "elevation", "multi_target", "class")
 
 # Multiples of a quarter are exact, so that ties are ties.
 quarters = st.integers(-20, 20).map(lambda number: number / 4)
@@ -36,12 +35,6 @@ def radar_frame(points: int = 30, seed: int = 1) -> Scan:
     xyz = random.uniform(-20, 20, (points, 3)).astype(np.float32)
     fields = {"doppler": random.normal(size=points), "rcs": np.arange(points)}
     return Scan(xyz, fields={**dict(zip("xyz", xyz.T, strict=True)), **fields}, name="frame.npz")
-
-
-@pytest.fixture(scope="module")
-def ars548(shared: Path) -> Scan:
-    """Real detections of a 4D radar."""
-    return read_scan(shared / "data/radar/ars548_detections.npy", ARS548)
 
 
 @given(st.lists(quarters, max_size=12), st.lists(quarters, max_size=12), quarters.map(abs))
@@ -72,54 +65,18 @@ def test_the_lidar_comes_first_and_both_keep_their_order() -> None:
     assert fused.label is None
 
 
-def test_a_radar_with_intensity_keeps_it() -> None:
-    radar = replace(radar_frame(3), intensity=np.array([1, 2, 3], np.float32))
-    fused = fuse(Scan(np.ones((1, 3), np.float32)), radar, PLACE)
-    assert fused.intensity is not None
-    assert fused.intensity.tolist() == [0, 1, 2, 3]
-
-
-def test_both_parts_are_had_back(ars548: Scan, shared: Path) -> None:
-    lidar = read_scan(shared / "data/clean/kitti_front.bin")
-    fused = fuse(lidar, ars548, PLACE, channels=["doppler", "rcs"])
-    assert fused.radar is not None
-    assert len(fused) == len(lidar) + 308
-    np.testing.assert_array_equal(fused.xyz[~fused.radar], lidar.xyz)
-    np.testing.assert_array_equal(fused.intensity[~fused.radar], lidar.intensity)
-    back = PLACE.inverse(fused.xyz[fused.radar])
-    np.testing.assert_allclose(back, ars548.xyz, atol=1e-4)
-    for name in ("doppler", "rcs"):
-        np.testing.assert_array_equal(fused.fields[name][fused.radar], ars548.fields[name])
-        assert np.isnan(fused.fields[name][~fused.radar]).all()
-
-
-def test_real_detections_are_where_their_angles_say(ars548: Scan) -> None:
-    # Which says that the format example is in our frame: x forward, y left, z up.
-    distance, azimuth, elevation = (ars548.fields[n] for n in ("range", "azimuth", "elevation"))
-    level = distance * np.cos(elevation)
-    expected = [level * np.cos(azimuth), level * np.sin(azimuth), distance * np.sin(elevation)]
-    np.testing.assert_allclose(ars548.xyz, np.stack(expected, axis=1), atol=1e-3)
-
-
-def test_what_no_lidar_point_is_near_is_of_unknown_label(ars548: Scan, shared: Path) -> None:
-    lidar = read_scan(shared / "data/clean/kitti_front.bin")
-    lidar = lidar.with_label(np.arange(len(lidar)) % 8)
-    fused = fuse(lidar, ars548, PLACE, label_within=1)
-    assert fused.label is not None
-    np.testing.assert_array_equal(fused.label[: len(lidar)], lidar.label)
-    distance = np.linalg.norm(
-        fused.xyz[fused.radar, None].astype(float) - lidar.xyz.astype(float), axis=2
-    )
-    expected = np.where(distance.min(axis=1) <= 1, lidar.label[distance.argmin(axis=1)], UNKNOWN)
-    np.testing.assert_array_equal(fused.label[fused.radar], expected)
-    assert 0 < (expected == UNKNOWN).sum() < len(expected)
-
-
 def test_a_radar_that_knows_its_labels_keeps_them() -> None:
     lidar = Scan.of(scene(10)).with_label(np.zeros(10, np.int64))
-    fused = fuse(lidar, radar_frame(3).with_label(np.array([1, 2, 3])), PLACE)
+    radar = replace(radar_frame(3), intensity=np.array([1, 2, 3], np.float32))
+    fused = fuse(lidar, radar.with_label(np.array([1, 2, 3])), PLACE)
     assert fused.label is not None
     assert fused.label[10:].tolist() == [1, 2, 3]
+    assert fused.intensity is not None
+    assert fused.intensity[10:].tolist() == [1, 2, 3]
+    found = fuse(lidar, radar, HERE, label_within=1000).label
+    np.testing.assert_array_equal(found[10:], transfer_labels(lidar, radar.xyz, within=1000))
+    with pytest.raises(InputError, match="it has no labels"):
+        transfer_labels(radar, lidar.xyz)
 
 
 def test_rows_that_cannot_be_judged_stay_as_they_are() -> None:
@@ -216,18 +173,3 @@ def test_points_that_cannot_be_judged_neither_give_nor_get_labels() -> None:
     near = labelled([[0.1, 0, 0]], [1])
     lost = np.array([[0, 0, 0], [np.nan, 0, 0], [np.inf, 0, 0]], np.float32)
     assert transfer_labels(near, lost).tolist() == 3 * [UNKNOWN]
-
-
-@pytest.mark.parametrize(("name", "scan"), list(hard_cases(3000)))
-def test_every_hard_case_gives_labels_and_gets_them(name: str, scan: Scan) -> None:
-    ordinary = Scan.of(scene(200)).with_label(np.arange(200))
-    gets = transfer_labels(ordinary, scan.xyz)
-    assert gets.shape == (len(scan),)
-    assert (gets[~scan.valid] == UNKNOWN).all()
-    gives = transfer_labels(scan.with_label(np.ones(len(scan), np.int64)), ordinary.xyz)
-    assert set(gives) <= {1, UNKNOWN}
-
-
-def test_a_scan_without_labels_is_refused() -> None:
-    with pytest.raises(InputError, match="array: it has no labels"):
-        transfer_labels(Scan.of(scene(5)), scene(5)[:, :3])

@@ -2,6 +2,7 @@
 
 import math
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.evaluation.hard_cases import hard_cases, scene
+from derain.evaluation.hard_cases import hard_cases
 from derain.scan import FEWEST_ALIKE, Scan
 
 HARD_CASES = dict(hard_cases())
@@ -88,19 +89,14 @@ def test_intensity_was_measured_where_it_differs_or_the_points_are_few(
 
 def test_intensities_of_another_unit_leave_the_columns_of_the_file() -> None:
     scan = full_scan()
+    scan.intensity[0] = -1  # the mark of a cell without a return
     scaled = scan.with_intensity_times(255)
-    np.testing.assert_array_equal(scaled.intensity, 255 * scan.intensity)
+    np.testing.assert_array_equal(scaled.intensity, [-1, 255, 510, 765, 1020, 1275])
     assert scaled.fields is scan.fields
     assert scan.with_intensity_times(1) is scan
     for factor in (0, -1, math.nan, math.inf):
         with pytest.raises(InputError, match="Give a number above 0"):
             scan.with_intensity_times(factor)
-
-
-def test_a_cell_is_empty_only_if_every_column_says_so() -> None:
-    rows = np.array([[-1, -1, -1, -1], [-1, -1, -1, 5], [-1, -1, 2, -1]])
-    assert Scan.of(rows).valid.tolist() == [False, True, True]
-    assert Scan.of(rows[:, :3]).valid.tolist() == [False, False, True]
 
 
 @given(rows_of_four)
@@ -121,40 +117,20 @@ def test_a_hard_scan_has_a_finite_range_and_intensity_wherever_it_is_valid(scan:
 
 
 def test_an_array_becomes_a_scan_of_its_first_four_columns() -> None:
-    points = np.arange(15, dtype=np.int64).reshape(3, 5)
+    points = np.arange(15.0).reshape(3, 5)
     scan = Scan.of(points, name="numbers")
     np.testing.assert_array_equal(scan.xyz, points[:, :3])
     np.testing.assert_array_equal(scan.intensity, points[:, 3])
     assert scan.xyz.dtype == np.float32
     assert (len(scan), scan.name) == (3, "numbers")
-
-
-def test_an_array_of_three_columns_has_no_intensity() -> None:
-    assert Scan.of(np.ones((2, 3))).intensity is None
-
-
-def test_a_scan_passes_through_as_it_is() -> None:
-    scan = full_scan()
     assert Scan.of(scan) is scan
+    assert Scan.of(points[:, :3]).intensity is None
 
 
-def test_numbers_beyond_float32_are_points_that_cannot_be_judged() -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        scan = Scan.of(np.array([[1e300, 0, 0, 0], [1, 2, 3, -1e300], [1, 2, 3, 4]]))
-        assert scan.valid.tolist() == [False, False, True]
-
-
-@pytest.mark.parametrize("shape", [(0,), (4,), (5, 2), (2, 4, 4), ()])
+@pytest.mark.parametrize("shape", [(0,), (4,), (5, 2), (2, 4, 4), (), (4, 100)])
 def test_an_array_that_is_not_rows_of_points_is_refused(shape: tuple[int, ...]) -> None:
     with pytest.raises(InputError, match=r"mine: points have shape .*\. Give an array"):
         Scan.of(np.zeros(shape), name="mine")
-
-
-@pytest.mark.parametrize("rows", [3, 4])
-def test_a_transposed_array_is_refused(rows: int) -> None:
-    with pytest.raises(InputError, match=r"\.T\.$"):
-        Scan.of(np.zeros((rows, 100)))
 
 
 def test_what_is_no_array_of_points_is_refused_with_what_to_give_instead() -> None:
@@ -162,22 +138,13 @@ def test_what_is_no_array_of_points_is_refused_with_what_to_give_instead() -> No
     for given_, hint in (
         ("drive/scan.bin", r"drive/scan\.bin: .*derain\.read_scan"),
         (Path("drive/scan.bin"), r"drive/scan\.bin: .*derain\.read_scan"),
-        (structured, "fields x, y.*column_stack"),
-        (None, "NoneType"),
+        (structured, "shape"),
+        (None, "shape"),
         ([[1, 2, 3], [4]], "array"),
         (np.array([["a", "b", "c"]]), "xyz"),
     ):
         with pytest.raises(InputError, match=hint):
             Scan.of(given_)
-
-
-@pytest.mark.parametrize("columns", [3, 4])
-def test_a_buffer_may_be_filled_anew_while_a_scan_of_it_is_in_use(columns: int) -> None:
-    buffer = np.ones((5, columns), np.float32)
-    scan = Scan.of(buffer)
-    buffer[:] = 2
-    assert (scan.xyz == 1).all()
-    assert columns == 3 or (scan.intensity == 1).all()
 
 
 def test_every_array_that_a_scan_is_given_is_copied() -> None:
@@ -198,15 +165,13 @@ def test_every_array_that_a_scan_is_given_is_copied() -> None:
 
 
 @pytest.mark.parametrize("dtype", [np.uint32, np.uint16, np.int32, np.uint8, float])
-def test_class_ids_of_any_dtype_are_taken(dtype: type) -> None:
-    label = Scan.of(np.ones((2, 3))).with_label(np.array([40, 110], dtype)).label
+def test_class_ids_of_any_dtype_are_taken_without_the_instances_of_label_files(dtype: type) -> None:
+    instance = 7 << 16 if dtype is np.uint32 else 0
+    scan = Scan.of(np.ones((2, 3)))
+    label = scan.with_label(np.array([40, instance + 110], dtype)).label
     assert label.dtype == np.int64
     assert label.tolist() == [40, 110]
-
-
-def test_labels_of_label_files_are_taken_without_their_instances() -> None:
-    raw = np.array([40, 7 << 16 | 110], np.uint32)
-    assert Scan.of(np.ones((2, 3))).with_label(raw).label.tolist() == [40, 110]
+    assert scan.label is None
 
 
 @pytest.mark.parametrize("label", [[0.5, 1], [math.nan, 1], ["snow", "rain"]])
@@ -215,27 +180,16 @@ def test_class_ids_that_are_not_whole_numbers_are_refused(label: list[Any]) -> N
         Scan.of(np.ones((2, 3))).with_label(np.array(label))
 
 
-def test_coordinates_of_float64_are_converted() -> None:
-    scan = Scan(np.ones((2, 3)), np.ones(2))
-    assert scan.xyz.dtype == scan.intensity.dtype == np.float32
-
-
-@pytest.mark.parametrize("column", ["intensity", "label", "radar"])
-def test_a_column_of_two_axes_is_refused(column: str) -> None:
-    with pytest.raises(InputError, match=rf"{column} has shape \(3, 1\)"):
-        Scan(np.ones((3, 3)), **{column: np.ones((3, 1))})
-
-
 @pytest.mark.parametrize("column", ["intensity", "label", "radar", "fields"])
-def test_a_column_of_another_length_is_refused(column: str) -> None:
+def test_a_column_of_another_shape_is_refused(column: str) -> None:
     short = np.zeros(2)
     columns = {column: {"ring": short} if column == "fields" else short}
     title = "ring" if column == "fields" else column
     with pytest.raises(InputError, match=f"cloud.bin: {title} has 2 rows for 3 points"):
         Scan(np.zeros((3, 3), np.float32), name="cloud.bin", **columns)
-
-
-def test_coordinates_of_another_width_are_refused() -> None:
+    if column != "fields":
+        with pytest.raises(InputError, match=rf"{column} has shape \(3, 1\)"):
+            Scan(np.ones((3, 3)), **{column: np.ones((3, 1))})
     with pytest.raises(InputError, match=r"coordinates have shape \(3, 4\)"):
         Scan(np.zeros((3, 4), np.float32))
 
@@ -250,37 +204,9 @@ def test_taking_rows_takes_them_of_every_column(rows: list[int]) -> None:
     assert set(taken.fields) == set(scan.fields)
     for name, column in scan.fields.items():
         np.testing.assert_array_equal(taken.fields[name], column[rows])
-    assert (taken.name, taken.header) == (scan.name, scan.header)
-
-
-def test_rows_that_are_left_form_no_grid() -> None:
-    assert full_scan().take(np.arange(6)).shape is None
-
-
-def test_taking_by_a_mask_keeps_the_order() -> None:
-    scan = full_scan()
-    mask = np.array([True, False, True, True, False, True])
-    np.testing.assert_array_equal(scan.take(mask).xyz, scan.take(np.flatnonzero(mask)).xyz)
-
-
-def test_taking_from_a_scan_of_coordinates_alone_invents_nothing() -> None:
-    taken = Scan(np.ones((4, 3), np.float32)).take(np.array([2]))
-    assert (taken.intensity, taken.label, taken.radar, taken.fields) == (None, None, None, {})
-
-
-def test_labels_are_added_to_a_copy() -> None:
-    scan = Scan(np.ones((4, 3), np.float32), intensity=np.ones(4, np.float32), name="street.bin")
-    labelled = scan.with_label(np.arange(4))
-    assert scan.label is None
-    assert labelled.label is not None
-    assert labelled.label.tolist() == [0, 1, 2, 3]
-    np.testing.assert_array_equal(labelled.xyz, scan.xyz)
-    assert labelled.name == "street.bin"
-
-
-def test_labels_of_another_length_are_refused() -> None:
-    with pytest.raises(InputError, match="label has 5 rows for 4 points"):
-        Scan(np.ones((4, 3), np.float32)).with_label(np.arange(5))
+    assert (taken.name, taken.header, taken.shape) == (scan.name, scan.header, None)
+    mask = np.isin(np.arange(6), rows)
+    np.testing.assert_array_equal(scan.take(mask).xyz, scan.xyz[mask])
 
 
 def test_the_usual_channels_are_the_scans_own() -> None:
@@ -290,6 +216,10 @@ def test_the_usual_channels_are_the_scans_own() -> None:
     np.testing.assert_array_equal(scan.channel("range"), scan.range)
     np.testing.assert_array_equal(scan.channel("intensity"), scan.intensity)
     assert scan.channel("radar").tolist() == [1, 0, 1, 0, 1, 0]
+    bare = Scan(scan.xyz, fields={"radar": ~scan.radar})
+    assert (bare.channel("intensity"), Scan(scan.xyz).channel("radar")) == (None, None)
+    assert bare.channel("radar").tolist() == [0, 1, 0, 1, 0, 1]
+    assert replace(bare, radar=scan.radar).channel("radar").tolist() == [1, 0, 1, 0, 1, 0]
 
 
 def test_a_column_of_the_file_is_a_channel_in_upper_and_lower_case() -> None:
@@ -299,13 +229,6 @@ def test_a_column_of_the_file_is_a_channel_in_upper_and_lower_case() -> None:
         assert channel.dtype == np.float32
         np.testing.assert_array_equal(channel, np.arange(6))
     assert scan.channel("doppler") is None
-
-
-def test_a_column_says_whose_a_point_is_where_the_scan_does_not() -> None:
-    column = {"radar": np.array([False, True])}
-    assert Scan(np.ones((2, 3), np.float32), fields=column).channel("radar").tolist() == [0, 1]
-    known = Scan(np.ones((2, 3), np.float32), radar=np.array([True, False]), fields=column)
-    assert known.channel("radar").tolist() == [1, 0]
 
 
 def test_what_no_sensor_measures_is_missing_from_a_column() -> None:
@@ -322,16 +245,3 @@ def test_what_no_sensor_measures_is_missing_from_a_column() -> None:
 )
 def test_a_column_that_is_not_one_number_a_point_is_no_channel(column: NDArray[Any]) -> None:
     assert Scan(np.ones((6, 3), np.float32), fields={"other": column}).channel("other") is None
-
-
-def test_a_scan_without_intensity_or_source_has_no_such_channels() -> None:
-    scan = Scan(np.ones((2, 3), np.float32))
-    assert (scan.channel("intensity"), scan.channel("radar")) == (None, None)
-
-
-def test_another_unit_makes_no_point_of_an_empty_cell() -> None:
-    table = np.concatenate([np.full((5, 4), -1, np.float32), scene(20)])
-    scan = Scan.of(table)
-    scaled = scan.with_intensity_times(255)
-    np.testing.assert_array_equal(scaled.valid, scan.valid)
-    np.testing.assert_array_equal(scaled.intensity[5:], table[5:, 3] * 255)

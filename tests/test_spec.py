@@ -16,7 +16,7 @@ from derain.views.back_projection import BACK_PROJECTIONS
 from derain.views.channels import MOST_CHANNELS
 from derain.views.neighbours import MOST_NETWORK_NEIGHBOURS, NeighbourView
 from derain.views.range_image import RangeView
-from derain.views.spherical_grid import MOST_PIXELS, SphericalGrid
+from derain.views.spherical_grid import SphericalGrid
 
 SPEC = Spec(
     network="outdet",
@@ -103,43 +103,34 @@ NAN, HUGE = float("nan"), 10**400
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
-        *(({"classes": wrong}, "classes") for wrong in (None, [], "rain", {"three": "rain"})),
-        *(({"classes": wrong}, "classes") for wrong in ({"-1": "r"}, {"65536": "r"}, {"3": 4})),
-        *(({"rain": wrong}, "rain") for wrong in ([4], [3.0], [True], [-1], 3, "110", [HUGE])),
-        *(({"std": [1, 2, 3, wrong]}, r"std\[3\]") for wrong in (0, -1, NAN, None, HUGE)),
-        *(({"mean": [wrong, 2, 3, 4]}, r"mean\[0\]") for wrong in (NAN, "1", [], True, HUGE)),
-        *(({"threshold": wrong}, "threshold") for wrong in (NAN, -0.1, 1.1, "0.5", None, HUGE)),
-        *(({"channels": wrong}, "channels") for wrong in ("xyzi", [1, 2, 3, 4], ["x"] * 4)),
+        *(({"classes": wrong}, "classes") for wrong in (None, {"three": "r"}, {"65536": "r"})),
+        *(({"rain": wrong}, "rain") for wrong in ([4], [-1], 3)),
+        ({"std": [1, 2, 3, 0]}, r"std\[3\]"),
+        *(({"mean": [wrong, 2, 3, 4]}, r"mean\[0\]") for wrong in (NAN, HUGE)),
+        *(({"threshold": wrong}, "threshold") for wrong in (NAN, 1.1)),
+        *(({"channels": wrong}, "channels") for wrong in ("xyzi", ["x"] * 4)),
         ({"channels": ["x"] * (MOST_CHANNELS + 1)}, "more than 64 channels"),
         ({"channels": ["x", "y", "z", "dual_return"]}, "dual_return is no longer computed"),
         ({"channels": [], "units": [], "mean": [], "std": []}, "channels .* are none"),
         *(({name: [*SPEC.as_dict()[name]][:-1]}, "differ in number") for name in MEANS_OF),
-        *(({"rule": wrong}, "rule") for wrong in (None, [1], {"residual": "a"}, {"a": HUGE})),
-        *(({"training": wrong}, "training") for wrong in ([], {"00": "01"}, {"00": [1]})),
+        *(({"rule": wrong}, "rule") for wrong in (None, {"a": HUGE})),
+        *(({"training": wrong}, "training") for wrong in ([], {"00": [1]})),
         *(({name: 3}, name) for name in ("network", "data", "licence")),
         *(({"schema": wrong}, "schema") for wrong in (0, "1", None, 1.0)),
-        *(({"view": wrong}, "view") for wrong in (None, [], "neighbours", {}, {"kind": []})),
+        *(({"view": wrong}, "view") for wrong in (None, {}, {"kind": []})),
         ({"sensor": "of a later derain"}, "sensor: there is no such key"),
         ({"view": {"kind": "voxels"}}, "view.kind: unknown view 'voxels'"),
         ({"view": {"kind": "neighbours"}}, "view: neighbours is missing"),
         *(
             ({"view": {"kind": "neighbours", "neighbours": wrong}}, r"view\.neighbours")
-            for wrong in (-1, 0, MOST_NETWORK_NEIGHBOURS + 1, 10**9, HUGE, 9.0, True, "9", None)
+            for wrong in (0, MOST_NETWORK_NEIGHBOURS + 1, HUGE, 9.0, True)
         ),
         ({"view": {"kind": "neighbours", "neighbours": 9, "k": 9}}, r"view\.k: there is no"),
         *(
             ({"view": of_range_view(**changes).view}, reason)
             for changes, reason in (
                 ({"way_back": "guess"}, "no such back-projection: 'guess'"),
-                ({"way_back": 3}, "view.way_back: 3 is no text"),
-                ({"grid": {"columns": 8}}, "view.grid: its rows are described by nothing"),
-                ({"grid": None}, "view.grid: None is not a mapping"),
                 ({"grid": {"columns": 10**9, "edges": [1.0, 0.0]}}, "grid.columns: 1000000000"),
-                ({"grid": {"columns": 1, "rows": 10**9, "inclination": [0, 1]}}, "grid.rows"),
-                (
-                    {"grid": {"columns": MOST_PIXELS, "edges": [2.0, 1.0, 0.0]}},
-                    "a grid of 2 rows by",
-                ),
                 ({"grid": {"columns": 8, "edges": [1.0, HUGE]}}, r"view\.grid\.edges\[1\]"),
             )
         ),
@@ -184,9 +175,3 @@ def test_what_a_scan_lacks_is_what_its_means_stand_in_for() -> None:
     assert spec.missing_channels(gaps) == {"radar": 3.0}
     fused = replace(gaps, radar=np.array([False, True]))
     assert spec.missing_channels(fused) == {}
-
-
-def test_a_network_that_sees_no_intensity_has_no_unit_of_it() -> None:
-    spec = replace(SPEC, channels=("x", "y", "z", "range"))
-    assert (spec.mean_intensity, spec.intensity_unit) == (0.0, "not used")
-    assert (SPEC.mean_intensity, SPEC.intensity_unit) == (4.0, "0..255")

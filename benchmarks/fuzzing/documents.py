@@ -36,7 +36,6 @@ rain_area: [[2, -9], [60, -9], [60, 9], [2, 9]]
 boxes:
   car_1: {class: car, centre: [20, 1, -0.6], size: [4.5, 1.8, 1.5], heading: 5}
   mast_1: {class: sprinkler, centre: [8, 4.5, 0.7], size: [0.3, 0.3, 4]}
-plane: {distance: 0.1, points: 9, iterations: 1000, scans: 10, seed: 0}
 corrections:
   "003": {boxes: {car_1: {shift: [0.2, 0, 0]}}}
 """

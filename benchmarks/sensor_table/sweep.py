@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-
-from benchmarks.installed import DERAIN
+from benchmarks.processes import DERAIN
 
 # Folder of the data sets; no variant's is called so.
 DATA_SETS = "data-sets"

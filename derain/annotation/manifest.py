@@ -43,7 +43,7 @@ HIGHEST_NUMBER, LARGEST_SCALE = 10**9, 1e9
 TaughtPart = Literal["train", "validation"]
 TRAINING_PART: TaughtPart = "train"
 HELD_OUT_PART: TaughtPart = "validation"
-TAUGHT_PARTS = (TRAINING_PART, HELD_OUT_PART)
+TAUGHT_PARTS: tuple[TaughtPart, ...] = (TRAINING_PART, HELD_OUT_PART)
 
 # One scan in ONE_IN is held out, and at least one of a sequence of FEWEST_SCANS or more.
 ONE_IN, FEWEST_SCANS = 5, 3
@@ -233,7 +233,7 @@ def _scan_of(entry: Entry, home: Path) -> TaughtScan:
         "scan": place,
         "sequence": Entry.text,
         "number": lambda item: item.whole(0, HIGHEST_NUMBER),
-        "part": _part,
+        "part": lambda item: item.one_of(TAUGHT_PARTS),
     }
     return TaughtScan(**entry.record(fields, required=fields))
 
@@ -244,10 +244,3 @@ def _key(entry: Entry) -> str:
     if not key or Path(key).is_absolute() or {"..", ""} & set(key.split("/")):
         raise entry.fault(f"{shown(key)} is not the name of a scan", "Teach it again.")
     return key
-
-
-def _part(entry: Entry) -> TaughtPart:
-    if entry.value not in TAUGHT_PARTS:
-        raise entry.fault(f"is {shown(entry.value)}", f"Give {' or '.join(TAUGHT_PARTS)}.")
-    part: TaughtPart = entry.value
-    return part

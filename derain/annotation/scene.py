@@ -5,7 +5,6 @@
     boxes:
       car_1: {class: car, centre: [20, 1, -0.6], size: [4.5, 1.8, 1.5], heading: 5}
       mast_1: {class: sprinkler, centre: [8, 4.5, 0.7], size: [0.3, 0.3, 4]}
-    plane: {distance: 0.1, points: 9, iterations: 1000, scans: 10, seed: 0}
     corrections:                                 # of boxes in some sequences
       "003": {boxes: {car_1: {shift: [0.2, 0, 0]}}}
 
@@ -22,22 +21,15 @@ from matplotlib.path import Path as Outline
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.files.documents import Entry, shown
+from derain.files.documents import Entry
 from derain.simulation.classes import TrackClass
 
 Triple = tuple[float, float, float]
 Polygon = tuple[tuple[float, float], ...]
 
-# Most points that a candidate plane may be fitted to: more make it no better, and make it less
-# likely that all of them are road.
-MOST_FITTED = 100
-
 # Largest coordinate and length, metres: beyond the range of any LiDAR, and a product of three does
 # not overflow.
 FARTHEST = 1e6
-
-# Open3D's whole numbers have 32 bits.
-LARGEST_INTEGER = 2**31 - 1
 
 CLASS_BY_NAME = {kind.name.lower(): kind for kind in TrackClass}
 
@@ -150,31 +142,6 @@ class Box:
 
 
 @dataclass(frozen=True)
-class PlaneSearch:
-    """Parameters of the search for the road's plane.
-
-    Attributes:
-        distance: A point this near to a plane counts as lying in it, metres.
-        points: Number of points that each candidate plane is fitted to.
-        iterations: Number of candidate planes.
-        scans: Number of scans of a sequence to search, evenly spread. A few are enough, because the
-            scene does not move.
-        seed: Seed of the random generators.
-
-    Source: distance and points as in the ground removal of sporsho/3DUnOutDet. Its 50,000
-    iterations search whole scans, less than half of which is road. Over the road polygon most
-    points are road. Even if only half of them were, one of 1,000 candidates of 9 points would be
-    fitted to points of the road alone with a probability of 86 %.
-    """
-
-    distance: float = 0.1
-    points: int = 9
-    iterations: int = 1000
-    scans: int = 10
-    seed: int = 0
-
-
-@dataclass(frozen=True)
 class Scene:
     """A static scene in the sensor's frame.
 
@@ -187,7 +154,6 @@ class Scene:
             no box are rain. The paper does not state it. The default is the distance within which
             a point counts as lying in the plane: with a smaller one parts of an uneven road become
             rain, with a greater one low drops become road.
-        plane: Parameters of the search for the road's plane.
         corrections: Corrections of boxes, by sequence and box.
     """
 
@@ -195,7 +161,6 @@ class Scene:
     boxes: Mapping[str, Box] = field(default_factory=dict)
     rain_area: Polygon | None = None
     height: float = 0.1
-    plane: PlaneSearch = field(default_factory=PlaneSearch)
     corrections: Mapping[str, Mapping[str, Correction]] = field(default_factory=dict)
 
     def in_sequence(self, sequence: str) -> "Scene":
@@ -234,7 +199,6 @@ def read_scene(path: Path) -> Scene:
         "boxes": lambda entry: entry.each(_box),
         "rain_area": _polygon,
         "height": _metres,
-        "plane": _plane_search,
         "corrections": lambda entry: entry.each(_corrections),
     }
     scene = Scene(**Entry.of_yaml(path).record(parsers, required=["road"]))
@@ -262,17 +226,6 @@ def _box(entry: Entry) -> Box:
     return Box(values.pop("class"), **values)
 
 
-def _plane_search(entry: Entry) -> PlaneSearch:
-    parsers = {
-        "distance": _length,
-        "points": lambda value: value.whole(3, MOST_FITTED),
-        "iterations": lambda value: value.whole(1, LARGEST_INTEGER),
-        "scans": lambda value: value.whole(1, LARGEST_INTEGER),
-        "seed": lambda value: value.whole(0, LARGEST_INTEGER),
-    }
-    return PlaneSearch(**entry.record(parsers))
-
-
 def _corrections(entry: Entry) -> dict[str, Correction]:
     """The corrections of one sequence, by box."""
     parsers = {"boxes": lambda boxes: boxes.each(_correction)}
@@ -286,11 +239,7 @@ def _correction(entry: Entry) -> Correction:
 
 
 def _class(entry: Entry) -> TrackClass:
-    if not isinstance(entry.value, str) or entry.value not in CLASS_BY_NAME:
-        raise entry.fault(
-            f"there is no class {shown(entry.value)}", f"Known are {', '.join(CLASS_BY_NAME)}."
-        )
-    return CLASS_BY_NAME[entry.value]
+    return CLASS_BY_NAME[entry.one_of(CLASS_BY_NAME)]
 
 
 def _triple(entry: Entry) -> Triple:

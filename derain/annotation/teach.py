@@ -1,16 +1,18 @@
-"""Labels recordings by a method, and writes the data card of the labels."""
+"""Labels recordings by a method, and writes the labels, their data card and their manifest."""
 
 import os
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
+from numpy.typing import NDArray
 from tqdm import tqdm
 
-from derain.annotation.labelling import TAUGHT_CARD, LabelledScan, Labelling
 from derain.annotation.manifest import (
     CARD,
     LABELS,
@@ -23,20 +25,137 @@ from derain.annotation.manifest import (
 )
 from derain.cards.card import DataCard
 from derain.errors import InputError
-from derain.files.atomic import replacing
-from derain.files.labels import LABEL
+from derain.evaluation.answers import NOT_KNOWN, TEACHERS_ANSWERS, Answers, TruthRecord
+from derain.files.atomic import replacing, temporary_folder, writing
+from derain.files.labels import LABEL, write_labels
+from derain.files.reading import reading
 from derain.jobs.job import FOLDER, Job
 from derain.jobs.running import Submits, Task, completed, run
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
-from derain.sources.judging import Guard, unguarded
+from derain.sources.judgement import Judgement
+from derain.sources.judging import Answer, Guard, unguarded
 from derain.sources.method import Method
 from derain.sources.sink import FolderSink, LabelSink
 from derain.sources.source import Source
+from derain.sources.unit_judging import UnitJudging
 from derain.sources.units import Division, FrameUnit, units_of, whole
+from derain.views.scan_issues import ScanIssue, much_removed
 
-# The folder of the labels until all of them are known.
-UNFINISHED = ".unfinished"
+# Class ids of a teacher's answers.
+TAUGHT_NOT_RAIN, TAUGHT_RAIN, TAUGHT_UNKNOWN = 0, 1, 255
+TAUGHT_CLASSES = (TAUGHT_NOT_RAIN, TAUGHT_RAIN, TAUGHT_UNKNOWN)
+TAUGHT_CARD = DataCard(
+    "taught",
+    classes=dict(zip(TAUGHT_CLASSES, TEACHERS_ANSWERS.values(), strict=True)),
+    rain=(TAUGHT_RAIN,),
+    unknown=(TAUGHT_UNKNOWN,),
+)
+
+
+@dataclass(frozen=True)
+class LabelledScan:
+    """The labels of one scan, counted.
+
+    Attributes:
+        frame: The scan.
+        answers: Counts of its labels.
+        milliseconds: Time of each stage.
+        truth: Its points by their own labels, as :attr:`derain.evaluation.RainCounts.cells` for
+            each title of a :class:`TruthRecord`; None where they are not measured.
+        issues: What is odd about it.
+        error: Why it has no labels; None where it has.
+    """
+
+    frame: Frame
+    answers: Answers = field(default_factory=Answers.none)
+    milliseconds: Mapping[str, float] = field(default_factory=dict)
+    truth: Sequence[NDArray[np.int64]] | None = None
+    issues: Sequence[ScanIssue] = ()
+    error: InputError | None = None
+
+    @property
+    def name(self) -> str:
+        """File of the scan."""
+        return self.frame.name
+
+    @property
+    def is_known(self) -> bool:
+        """Whether anything is known of it."""
+        return bool(self.answers.table[:, :NOT_KNOWN].any())
+
+
+@dataclass(frozen=True)
+class Labelling(UnitJudging[LabelledScan]):
+    """Labels the scans of one unit after the other, also those of which nothing is known.
+
+    Attributes:
+        folder: Where the labels go, as of :func:`derain.annotation.manifest.label_path`.
+        card: Data card of the scans, whose own labels measure the method's; None where there is
+            none.
+    """
+
+    folder: Path
+    card: DataCard | None
+
+    def do(self, unit: FrameUnit) -> Iterator[LabelledScan]:
+        """Labels the scans of a unit."""
+        for frame, answer in self.judged(unit.map(Frame.without_labels)):
+            if isinstance(answer, InputError):
+                yield LabelledScan(frame, error=answer)
+                continue
+            try:
+                with reading(Path(frame.name)):  # which names the file where the memory is full
+                    labelled = self._labelled(unit.by_key[frame.key], answer)
+            except InputError as error:
+                labelled = LabelledScan(frame, error=error)
+            yield labelled
+
+    def is_there(self, unit: FrameUnit) -> bool:
+        """Whether all scans of the unit have labels."""
+        return all(label_path(self.folder, frame.key).exists() for frame in unit.frames)
+
+    def failed(self, unit: FrameUnit, error: InputError) -> Iterator[LabelledScan]:
+        """The result of a unit that failed as a whole, which is that of its first scan."""
+        yield LabelledScan(unit.frames[0], error=error)
+
+    def error_of(self, result: LabelledScan) -> InputError | None:
+        """Why a scan has no labels."""
+        return result.error
+
+    def to_json(self, result: LabelledScan) -> dict[str, Any]:
+        """The counts of a scan as a record has them."""
+        return {
+            "key": result.frame.key,
+            "answers": result.answers.table.tolist(),
+            "milliseconds": dict(result.milliseconds),
+            "truth": None if result.truth is None else [cells.tolist() for cells in result.truth],
+        }
+
+    def from_json(self, unit: FrameUnit, written: dict[str, Any]) -> LabelledScan:
+        """The counts of a scan from its record."""
+        truth = written["truth"]
+        return LabelledScan(
+            unit.by_key[written["key"]],
+            Answers(np.array(written["answers"], np.int64)),
+            written["milliseconds"],
+            None if truth is None else [np.array(cells, np.int64) for cells in truth],
+        )
+
+    def _labelled(self, frame: Frame, answer: Answer) -> LabelledScan:
+        _, judgement, stopwatch = answer
+        labels = labels_of(judgement)
+        write_labels(label_path(self.folder, frame.key), labels)
+        issues = [*self.method.issues(judgement), *much_removed(judgement.share_of_rain)]
+        truth = None
+        if self.card is not None and frame.has_labels:
+            try:
+                truth = _measured(self.card, frame, judgement)
+            except InputError as error:
+                issues.append(ScanIssue("own labels not measured", f"not measured: {error}"))
+        answers = Answers.of(judgement.scan.with_label(labels), TAUGHT_CARD)
+        return LabelledScan(frame, answers, dict(stopwatch.milliseconds), truth, issues)
+
 
 # Receives each labelled scan.
 Watch = Callable[[LabelledScan], None]
@@ -244,23 +363,31 @@ def _link(file: Path, name: Path) -> None:
 
 @contextmanager
 def _unfinished(out: Path) -> Iterator[Path]:
-    """A temporary hidden folder; at the end, a new and empty folder around it is removed, too."""
-    folder = out / UNFINISHED
+    """Lends a temporary hidden folder in another, which is removed if it is new and stays empty."""
     there = out.is_dir()
     try:
-        shutil.rmtree(folder, ignore_errors=True)  # left behind by a run that was killed
-        folder.mkdir(parents=True)
-        yield folder
-    except BrokenPipeError:  # of the terminal, not of the folder
-        raise
-    except OSError as error:
-        raise InputError(
-            out,
-            f"cannot be written ({error.strerror or error})",
-            "Choose a folder that is writable and has room.",
-        ) from error
+        with writing(out), temporary_folder(out) as folder:
+            yield folder
     finally:
-        shutil.rmtree(folder, ignore_errors=True)
         if not there:
             with suppress(OSError):
                 out.rmdir()
+
+
+def labels_of(judgement: Judgement) -> NDArray[np.uint32]:
+    """The labels of each row of a judged scan, uint32 (N,), as they are written.
+
+    Rows of which the method is not sure, which it did not see or which hold no return are unknown.
+    """
+    labels = np.where(judgement.rain, np.uint32(TAUGHT_RAIN), np.uint32(TAUGHT_NOT_RAIN))
+    labels[~(judgement.answered & judgement.scan.valid)] = TAUGHT_UNKNOWN
+    return labels
+
+
+def _measured(card: DataCard, frame: Frame, judgement: Judgement) -> list[NDArray[np.int64]]:
+    """Counts the answers to a scan by its own labels, first of all points, then of sure ones."""
+    record = TruthRecord(card)
+    of_all = judgement.rain, np.ones_like(judgement.rain)
+    of_sure = judgement.rain, judgement.answered
+    record.add(frame, judgement.scan, of_all, of_sure)
+    return [counts.cells for counts in record.counts.values()]

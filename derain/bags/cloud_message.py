@@ -4,9 +4,11 @@ The bytes before and after the cloud are kept, so a message whose cloud does not
 back byte for byte. The library that reads bags is not used here: it needs the definitions of types,
 which bags of older ROS 2 do not hold.
 
-Source: of ROS 1, http://wiki.ros.org/msg ("Fields", little-endian, nothing aligned). Of ROS 2, CDR
-of DDSI-RTPS 2.5, 10.2 (encapsulation) and CORBA 3.3 part 2, 9.3 (alignment from the end of the
-encapsulation header).
+Numbers of a message are little-endian, whatever the order of the bytes of its points.
+
+Source: of ROS 1, http://wiki.ros.org/msg ("Fields", nothing aligned). Of ROS 2, CDR of DDSI-RTPS
+2.5, 10.2 (encapsulation) and CORBA 3.3 part 2, 9.3 (alignment from the end of the encapsulation
+header).
 """
 
 import struct
@@ -15,9 +17,8 @@ from typing import Self
 
 from derain.bags.point_cloud import PointCloud, PointField
 
-# What an encapsulation begins with: plain CDR in big- and little-endian byte order.
-CDR_ORDERS = {b"\x00\x00": ">", b"\x00\x01": "<"}
-CDR_HEADER = 4
+# What an encapsulation begins with: plain CDR in little-endian byte order; and its size.
+PLAIN_CDR, CDR_HEADER = b"\x00\x01", 4
 
 # How messages of ROS 1 and ROS 2 are written.
 ROS1, CDR = "ros1", "cdr"
@@ -35,7 +36,6 @@ class CloudMessage:
 
     Attributes:
         encoding: ``ros1`` or ``cdr``.
-        order: Byte order of the message, ``<`` or ``>``, whatever that of its points.
         head: Its bytes up to the cloud: the header with stamp and frame.
         cloud: The cloud.
         tail: Its bytes after the cloud.
@@ -43,7 +43,6 @@ class CloudMessage:
     """
 
     encoding: str
-    order: str
     head: bytes
     cloud: PointCloud
     tail: bytes
@@ -60,28 +59,25 @@ class CloudMessage:
         Raises:
             ValueError: Bytes that are no PointCloud2, or one that contradicts itself.
         """
-        order = _order_of(message, encoding)
-        read = _Reader(message, encoding, order)
-        try:
-            read.take(STAMP_AT[encoding] - read.position + 8)  # the stamp
-            read.string()  # the frame
-            head = message[: read.position]
-            height, width = read.number("I"), read.number("I")
-            fields = tuple(
-                PointField(read.string(), read.number("I"), read.number("B"), read.number("I"))
-                for _ in range(read.number("I"))
-            )
-            is_bigendian = bool(read.number("B"))
-            point_step, row_step = read.number("I"), read.number("I")
-            data = read.take(read.number("I"))
-            is_dense = bool(read.number("B"))
-        except struct.error as error:
-            raise ValueError("the message ends too early") from error
+        stamp = stamp_of(message, encoding)
+        read = _Reader(message, encoding)
+        read.take(STAMP_AT[encoding] - read.position + 8)  # the stamp
+        read.string()  # the frame
+        head = message[: read.position]
+        height, width = read.number("I"), read.number("I")
+        fields = tuple(
+            PointField(read.string(), read.number("I"), read.number("B"), read.number("I"))
+            for _ in range(read.number("I"))
+        )
+        is_bigendian = bool(read.number("B"))
+        point_step, row_step = read.number("I"), read.number("I")
+        data = read.take(read.number("I"))
+        is_dense = bool(read.number("B"))
         cloud = PointCloud(
             height, width, fields, is_bigendian, point_step, row_step, data, is_dense
         )
         tail = message[read.position :]
-        return cls(encoding, order, head, cloud, tail, stamp_of(message, encoding))
+        return cls(encoding, head, cloud, tail, stamp)
 
     def with_cloud(self, cloud: PointCloud) -> Self:
         """The same message with another cloud."""
@@ -89,7 +85,7 @@ class CloudMessage:
 
     def to_bytes(self) -> bytes:
         """The bytes of the message."""
-        cloud, write = self.cloud, _Writer(self.head, self.encoding, self.order)
+        cloud, write = self.cloud, _Writer(self.head, self.encoding)
         write.number("I", cloud.height)
         write.number("I", cloud.width)
         write.number("I", len(cloud.fields))
@@ -118,28 +114,14 @@ def stamp_of(message: bytes, encoding: str) -> int:
     Raises:
         ValueError: Bytes that are no such message.
     """
-    order, start = _order_of(message, encoding), STAMP_AT[encoding]
+    if encoding == CDR and message[:2] != PLAIN_CDR:
+        raise ValueError(f"it begins with {bytes(message[:4]).hex()}, which is no plain CDR")
+    start = STAMP_AT[encoding]
     if len(message) < start + 8:
         raise ValueError("the message ends too early")
-    # Seconds are signed in ROS 2.
-    seconds, nanoseconds = struct.unpack_from(
-        order + ("iI" if encoding == CDR else "II"), message, start
-    )
+    kinds = "<iI" if encoding == CDR else "<II"  # seconds are signed in ROS 2
+    seconds, nanoseconds = struct.unpack_from(kinds, message, start)
     return int(seconds) * 10**9 + int(nanoseconds)
-
-
-def _order_of(message: bytes, encoding: str) -> str:
-    """Byte order of a message, ``<`` or ``>``.
-
-    Raises:
-        ValueError: CDR of a kind that ROS 2 does not write.
-    """
-    if encoding == ROS1:
-        return "<"
-    order = CDR_ORDERS.get(bytes(message[:2]))
-    if order is None or len(message) < CDR_HEADER:
-        raise ValueError(f"it begins with {bytes(message[:4]).hex()}, which is no plain CDR")
-    return order
 
 
 def _aligned(position: int, size: int, encoding: str) -> int:
@@ -150,17 +132,15 @@ def _aligned(position: int, size: int, encoding: str) -> int:
 class _Reader:
     """Reads the values of a message one after the other."""
 
-    def __init__(self, message: bytes, encoding: str, order: str) -> None:
+    def __init__(self, message: bytes, encoding: str) -> None:
         self.message = memoryview(message)
         self.encoding = encoding
-        self.order = order
         self.position = 0
 
     def number(self, kind: str) -> int:
-        layout = struct.Struct(self.order + kind)
+        layout = struct.Struct("<" + kind)
         self.position = _aligned(self.position, layout.size, self.encoding)
-        (value,) = layout.unpack_from(self.message, self.position)
-        self.position += layout.size
+        (value,) = layout.unpack(self.take(layout.size))
         return int(value)
 
     def string(self) -> str:
@@ -181,13 +161,12 @@ class _Reader:
 class _Writer:
     """Appends values to the bytes of a message."""
 
-    def __init__(self, head: bytes, encoding: str, order: str) -> None:
+    def __init__(self, head: bytes, encoding: str) -> None:
         self.message = bytearray(head)
         self.encoding = encoding
-        self.order = order
 
     def number(self, kind: str, value: int) -> None:
-        layout = struct.Struct(self.order + kind)
+        layout = struct.Struct("<" + kind)
         place = _aligned(len(self.message), layout.size, self.encoding)
         self.message += bytes(place - len(self.message)) + layout.pack(value)
 

@@ -7,7 +7,7 @@ from collections.abc import Collection, Container, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any, BinaryIO, NamedTuple, Self
 
 import numpy as np
 from mcap.opcode import Opcode
@@ -59,12 +59,12 @@ class ChunkPlace(NamedTuple):
 
 
 class McapFile:
-    """A file of MCAP, open.
+    """A file of MCAP.
 
-    A file whose summary is missing or incomplete is read through once when it is opened.
+    A file whose summary is missing or incomplete is read through once.
 
     Args:
-        path: The file.
+        file: The file, open.
 
     Attributes:
         records: Its records by their places.
@@ -80,8 +80,8 @@ class McapFile:
         OSError: It cannot be read.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.records = McapRecords(path)
+    def __init__(self, file: BinaryIO) -> None:
+        self.records = McapRecords(file)
         self.schemas: dict[int, Schema] = {}
         self.channels: dict[int, Channel] = {}
         self.counts: Counter[int] = Counter()
@@ -89,16 +89,8 @@ class McapFile:
         self.chunks: list[ChunkPlace] = []
         # Times and places of messages that are in no chunk.
         self._times, self._offsets = array("Q"), array("Q")
-        try:
-            if not self._read_summary():
-                self._scan()
-        except BaseException:
-            self.close()
-            raise
-
-    def close(self) -> None:
-        """Closes the file."""
-        self.records.close()
+        if not self._read_summary():
+            self._scan()
 
     def connections(self) -> dict[int, McapConnection]:
         """Its channels by their numbers, without the counts of their messages.
@@ -270,15 +262,15 @@ class McapReader:
     """The files of a bag in MCAP, open inside a ``with`` block.
 
     Args:
-        files: Its files, in the order of time.
+        paths: Its files, in the order of time.
 
     Attributes:
         files: The same, open.
     """
 
-    def __init__(self, files: Sequence[Path]) -> None:
+    def __init__(self, paths: Sequence[Path]) -> None:
         self.files: list[McapFile] = []
-        self._paths = files
+        self._paths = paths
 
     @property
     def connections(self) -> list[McapConnection]:
@@ -357,9 +349,8 @@ class McapReader:
 
     def __enter__(self) -> Self:
         with ExitStack() as stack:
-            for path in self._paths:
-                self.files.append(McapFile(path))
-                stack.callback(self.files[-1].close)
+            opened = [stack.enter_context(path.open("rb")) for path in self._paths]
+            self.files = [McapFile(file) for file in opened]
             self._stack = stack.pop_all()
         return self
 

@@ -11,7 +11,6 @@ import os
 import struct
 from collections.abc import Callable, Iterable, Iterator
 from io import BytesIO
-from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 from zlib import crc32
 
@@ -62,10 +61,10 @@ class Place(NamedTuple):
 
 
 class McapRecords:
-    """An MCAP file, open.
+    """The records of an MCAP file.
 
     Args:
-        path: The file.
+        file: The file, open.
 
     Attributes:
         profile: What the header calls the kind of recording, such as ``ros2``.
@@ -77,18 +76,10 @@ class McapRecords:
         OSError: It cannot be read.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._file: BinaryIO = path.open("rb")
-        try:
-            self._size = os.fstat(self._file.fileno()).st_size
-            self._read_frame()
-        except BaseException:
-            self.close()
-            raise
-
-    def close(self) -> None:
-        """Closes the file."""
-        self._file.close()
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+        self._size = os.fstat(file.fileno()).st_size
+        self._read_frame()
 
     def places(self) -> Iterator[Place]:
         """Places of the records of the data, without those within chunks."""

@@ -135,7 +135,11 @@ class PointCloud:
         if not named or not len(self):
             return {f.name: np.empty((0, *f.dtype("=").shape), f.dtype("=").base) for f in named}
         points = self._points.view(table)[:, 0]
-        return {name: _native(points[name]) for name in table.names or ()}
+        columns = {name: points[name] for name in table.names or ()}
+        return {
+            name: column.astype(column.dtype.newbyteorder("="), copy=False)
+            for name, column in columns.items()
+        }
 
     def take(self, rows: NDArray[np.bool_]) -> Self:
         """Some of its points only, every byte of each as it was, as an unorganised cloud.
@@ -256,12 +260,6 @@ def scan_of_cloud(name: Path, cloud: PointCloud) -> Scan:
         column = named(columns, axis, name)
         if column is not None and (column.ndim > 1 or column.dtype.kind != "f"):
             count = f" of {column.shape[1]} values" if column.ndim > 1 else ""
-            raise ValueError(
-                f"{axis} is {column.dtype}{count}, of which nobody says how many make a metre"
-            )
+            raise ValueError(f"{axis} is {column.dtype}{count}, whose unit is not known")
     shape = (cloud.height, cloud.width) if cloud.is_organised and len(cloud) else None
     return scan_of(name, columns, shape)
-
-
-def _native(column: NDArray[Any]) -> NDArray[Any]:
-    return column if column.dtype.isnative else column.astype(column.dtype.newbyteorder("="))

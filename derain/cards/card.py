@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from derain.cards.layout import Layout
 from derain.errors import InputError
-from derain.files.documents import Entry, shown
-from derain.files.packaged import packaged, packaged_or_own
+from derain.files.documents import Entry, packaged, packaged_or_own, shown
 from derain.scan import LARGEST_ID, Scan
 from derain.views.channels import UNITS
 
 Parsed = TypeVar("Parsed")
 
-# What the names of a data set's folders tell of scans that lie in such, from the least to the most:
+# What follows for scans from the names of their folders, from the least to the most:
 # nothing, what their classes are called, or also which of the classes are rain.
 AutoDetect = Literal["nothing", "classes", "rain"]
 
@@ -53,11 +52,11 @@ class DataCard:
             that writes many points twice are published.
         split: Sequences of ``train``, ``validation`` and ``test``; empty without an official split.
         layout: Where its scans and labels lie.
-        auto_detect: What may be concluded where folders are called as ``layout`` says and nobody
+        auto_detect: What may be concluded where folders have the names of ``layout`` and nobody
             names a card: ``nothing``; ``classes``, the names of the classes; or ``rain``, all that
             the card says.
         parts: Ids of the classes of each of several data sets that it is the card of, by name; no
-            file says it.
+            file has it.
     """
 
     name: str
@@ -80,9 +79,9 @@ class DataCard:
 
     @property
     def title(self) -> str:
-        """Its name, which says so where the rain is simulated."""
-        told = "simulated" in self.name or not self.simulated
-        return self.name if told else f"{self.name} (simulated)"
+        """Its name, with a remark where the rain is simulated."""
+        is_clear = "simulated" in self.name or not self.simulated
+        return self.name if is_clear else f"{self.name} (simulated)"
 
     @property
     def has_statistics(self) -> bool:
@@ -253,7 +252,5 @@ def _if_known(parser: Callable[[Entry], Parsed]) -> Callable[[Entry], Parsed | N
 
 
 def _auto_detect(entry: Entry) -> AutoDetect:
-    if entry.value not in get_args(AutoDetect):
-        raise entry.fault(f"is {shown(entry.value)}", f"Give {', '.join(get_args(AutoDetect))}.")
-    detected: AutoDetect = entry.value
-    return detected
+    known: tuple[AutoDetect, ...] = get_args(AutoDetect)
+    return entry.one_of(known)

@@ -1,4 +1,4 @@
-"""What the names of folders tell: the layouts of the packaged data cards."""
+"""The layouts of the packaged data cards, and what follows from the names of folders."""
 
 from collections.abc import Collection, Iterable, Iterator
 from functools import cache
@@ -10,7 +10,7 @@ from derain.cards.layout import Layout
 from derain.files.labels import LABEL, label_beside
 from derain.files.names import scan_stem
 
-# The folder of labels where nothing else is said; only then may they lie beside the scans instead.
+# The usual folder of labels; where it is the layout's, they may lie beside the scans instead.
 USUAL_LABELS = Layout().labels
 
 
@@ -22,20 +22,20 @@ def cards_naming(ids: Collection[int]) -> list[str]:
 
 @cache
 def known_layouts() -> tuple[Layout, ...]:
-    """The layouts of the packaged data cards, those first whose folders tell most."""
+    """The layouts of the packaged data cards, those first from whose folders most follows."""
     cards = sorted(_packaged(), key=lambda card: _rank(card.auto_detect), reverse=True)
     return tuple(dict.fromkeys(card.layout for card in cards))
 
 
 def card_by_folders(layout: Layout, least: AutoDetect) -> DataCard | None:
-    """The packaged data card that may be concluded from folders called as a layout says.
+    """The packaged data card that follows from folders of a layout.
 
     Args:
         layout: What the folders are called.
-        least: What is asked of the card: ``classes`` or ``rain``.
+        least: What has to follow: ``classes`` or ``rain``.
 
     Returns:
-        The card whose folders tell so much; None where none does.
+        The card from whose folders so much follows; None without one.
     """
     cards = [card for card in _packaged() if card.layout.scans == layout.scans]
     return next((card for card in cards if _rank(card.auto_detect) >= _rank(least)), None)
@@ -82,5 +82,5 @@ def _packaged() -> tuple[DataCard, ...]:
 
 
 def _rank(detected: AutoDetect) -> int:
-    """How much the names of folders tell: they are listed from the least to the most."""
+    """How much follows from the names of folders: listed from the least to the most."""
     return get_args(AutoDetect).index(detected)

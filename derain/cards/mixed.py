@@ -1,4 +1,4 @@
-"""One data card of several data sets, whose classes keep apart what each of them says of rain."""
+"""One data card of several data sets, whose classes keep the rain of each apart."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -64,7 +64,7 @@ def mixed_card(cards: Mapping[str, DataCard]) -> DataCard:
     """The data card of several data sets, without statistics.
 
     Its classes are those of all, called ``part: class``: what is rain to one may be none to
-    another, and what became of each can be told afterwards.
+    another, and each can be counted by itself afterwards.
 
     Example:
         >>> from derain.cards.card import load_card

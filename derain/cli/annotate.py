@@ -89,7 +89,7 @@ def main(arguments: argparse.Namespace) -> int:
     require("annotate", OPEN3D, MATPLOTLIB)
     from derain.annotation.picture import annotation_figure
     from derain.annotation.scene import read_scene
-    from derain.annotation.steps import annotate, road_plane
+    from derain.annotation.steps import SCANS_OF_A_PLANE, annotate, road_plane
     from derain.pictures.scan_pictures import save
 
     folders = map(_folder_of_scans, arguments.scans)
@@ -99,7 +99,7 @@ def main(arguments: argparse.Namespace) -> int:
     radar = _radar_frames(arguments.radar, arguments.radar_columns, source)
     radar_sink = FolderSink(sink.folder / "radar")
     scene = read_scene(arguments.scene).in_sequence(sequence)
-    plane = road_plane([frame.read() for frame in evenly_spaced(source, scene.plane.scans)], scene)
+    plane = road_plane([frame.read() for frame in evenly_spaced(source, SCANS_OF_A_PLANE)], scene)
 
     points: Counter[int] = Counter()
     for frame in tqdm(source, unit="scan", disable=None):

@@ -25,7 +25,7 @@ from derain.files.format import FORMATS
 from derain.files.names import scan_suffix
 from derain.files.reading import is_file
 from derain.filters import FILTERS
-from derain.recordings.registry import METHODS
+from derain.recordings.recording_method import METHODS
 from derain.sources.method import Method
 from derain.stores.url import Place, is_url, place_of
 

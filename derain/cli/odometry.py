@@ -22,7 +22,7 @@ from pathlib import Path
 from derain.bags.names import within
 from derain.cli.options import add_columns, add_json, add_threads, add_topic
 from derain.cli.outputs import exit_code, print_error, print_facts, print_lines
-from derain.recordings.registration import Registration
+from derain.recordings.odometry import Registration
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.sources.judging import Failures

@@ -49,7 +49,7 @@ from derain.system.memory import keep_freed_memory
 from derain.workflows.odometry import placed
 
 if TYPE_CHECKING:
-    from derain.annotation.labelling import LabelledScan
+    from derain.annotation.teach import LabelledScan
 
 
 def add_arguments(parser: Parser) -> None:

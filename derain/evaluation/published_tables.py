@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeVar
 
 from derain.errors import InputError
-from derain.files.documents import Entry
-from derain.files.packaged import packaged
+from derain.files.documents import Entry, packaged
 
 Item = TypeVar("Item")
 

@@ -57,7 +57,7 @@ def read_scan(path: Path | str, columns: Sequence[str] = DEFAULT_COLUMNS) -> Sca
 
 
 def count_points(path: Path, columns: Sequence[str] = DEFAULT_COLUMNS) -> int:
-    """Number of points of a scan, which is read only where the size of its file does not tell.
+    """Number of points of a scan, which is read only where its file's size is not enough.
 
     Args:
         path: As for :func:`read_scan`.
@@ -114,7 +114,12 @@ def find_scans(paths: Iterable[Path | str]) -> list[Path]:
     scans: list[Path] = []
     for path in map(Path, paths):
         with reading(path):
-            scans += _scans_in(path) if path.is_dir() else [_existing(path)]
+            if path.is_dir():
+                scans += _scans_in(path)
+            elif path.exists():
+                scans.append(path)
+            else:
+                raise InputError(path, "there is no such file or folder", "Check the path.")
     return scans
 
 
@@ -134,9 +139,3 @@ def _scans_in(folder: Path) -> list[Path]:
             folder, f"holds no scans ({', '.join(FORMATS)})", "Name a folder with scans in it."
         )
     return scans
-
-
-def _existing(path: Path) -> Path:
-    if not path.exists():
-        raise InputError(path, "there is no such file or folder", "Check the path.")
-    return path

@@ -63,7 +63,7 @@ def scan_of(
             points of the radar) if there are; and whatever else the file holds. A name in
             another case counts where no column has exactly this one.
         shape: (height, width) of an organised cloud.
-        header: What the file says besides its columns, for the writer of its format.
+        header: The content of the file besides its columns, for the writer of its format.
 
     Raises:
         InputError: No coordinates, coordinates that are not numbers, or columns of which several
@@ -117,16 +117,12 @@ def columns_of(scan: Scan) -> dict[str, NDArray[Any]]:
         scan made in memory. Coordinates held in one `xyz` array come out as x, y and z, which every
         format can hold.
     """
-    fields: dict[str, NDArray[Any]] = dict(scan.fields)
-    if not fields:
-        fields["xyz"] = scan.xyz
-        if scan.intensity is not None:
-            fields["intensity"] = scan.intensity
+    of_memory = {"xyz": scan.xyz, "intensity": scan.intensity}
     columns: dict[str, NDArray[Any]] = {}
-    for name, column in fields.items():
-        if name == "xyz":
+    for name, column in (scan.fields or of_memory).items():
+        if name == "xyz" and column is not None:
             columns |= {axis: column[:, place] for place, axis in enumerate("xyz")}
-        else:
+        elif column is not None:
             columns[name] = column
     return columns
 

@@ -10,13 +10,14 @@ import re
 import reprlib
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
 
 import yaml
 
 from derain.errors import InputError, did_you_mean
-from derain.files.reading import reading
+from derain.files.reading import is_file, read_bytes, reading
 
 # Far more than any card, scene or Spec takes, and read in a second.
 LARGEST_DOCUMENT = 2**20
@@ -79,7 +80,7 @@ _SHORT.maxlevel, _SHORT.maxstring, _SHORT.maxother = 2, 60, 60
 
 @dataclass(frozen=True)
 class Entry:
-    """A value of a document that knows where it stands, so that what is wrong with it can be said.
+    """A value of a document that knows its place, so that an error can name it.
 
     Every method raises InputError for a value of another kind than it reads; the message has the
     document and the key.
@@ -107,13 +108,13 @@ class Entry:
                 or is not YAML.
         """
         with reading(path, *_YAML_DAMAGE):
-            return cls(path, "", parsed_yaml(_text(path, largest), largest))
+            return cls(path, "", parsed_yaml(read_bytes(path, largest).decode("utf-8"), largest))
 
     @classmethod
     def of_json_file(cls, path: Path, largest: int = LARGEST_DOCUMENT) -> "Entry":
         """The whole of a JSON file; arguments and errors as for :meth:`of_yaml`."""
         with reading(path, ValueError):
-            text = _text(path, largest)
+            text = read_bytes(path, largest).decode("utf-8")
         return cls.of_json(text, path, largest)
 
     @classmethod
@@ -141,7 +142,7 @@ class Entry:
         return cls(source, "", value)
 
     def fault(self, reason: str, remedy: str) -> InputError:
-        """The error that says what is wrong here."""
+        """The error of a wrong value here."""
         return InputError(
             f"{self.source}: {short(self.key)}" if self.key else self.source, reason, remedy
         )
@@ -269,6 +270,15 @@ class Entry:
             raise self.fault("it has a null character", "Leave it out.")
         return self.value
 
+    def one_of(self, choices: Collection[Parsed]) -> Parsed:
+        """One of some known texts."""
+        for choice in choices:
+            if choice == self.value:
+                return choice
+        raise self.fault(
+            f"{shown(self.value)} is not known", f"Known are {', '.join(map(str, choices))}."
+        )
+
     def texts(self) -> tuple[str, ...]:
         """A list of texts."""
         return tuple(item.text() for item in self.items())
@@ -293,14 +303,6 @@ def short(text: str) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def _text(path: Path, largest: int) -> str:
-    with path.open("rb") as file:
-        content = file.read(largest + 1)
-    if len(content) > largest:
-        raise ValueError(f"more than {largest:,} bytes")
-    return content.decode("utf-8")
-
-
 def _refuse_depth(value: Any, depth: int = 0) -> None:
     if depth > DEEPEST:
         raise ValueError(f"nested more than {DEEPEST} deep")
@@ -310,7 +312,7 @@ def _refuse_depth(value: Any, depth: int = 0) -> None:
 
 
 def parsed_yaml(text: str, largest: int = LARGEST_DOCUMENT, aliases: bool = False) -> Any:
-    """What a text in YAML says.
+    """The value of a text in YAML.
 
     Args:
         text: The text.
@@ -340,3 +342,32 @@ def _refuse_expanding_aliases(text: str, most: int, aliases: bool) -> None:
         depth -= isinstance(event, yaml.CollectionEndEvent)
         if depth > DEEPEST:
             raise ValueError(f"nested more than {DEEPEST} deep")
+
+
+def packaged(package: str, folder: str = "") -> dict[str, Path]:
+    """The YAML files of a package, by name, sorted: each is found by being there.
+
+    Args:
+        package: Name of the package, such as ``derain.cards``.
+        folder: Folder within it, where they do not lie beside the package's modules.
+    """
+    files = Path(str(resources.files(package))) / folder
+    return {file.stem: file for file in sorted(files.glob("*.yaml"))}
+
+
+def packaged_or_own(name: str | Path, files: Mapping[str, Path], kind: str) -> Path:
+    """The file that a user names.
+
+    Args:
+        name: Name of a packaged file, or the path of one of the user's own.
+        files: The packaged ones, by name.
+        kind: What they are, such as "sensor", for the message.
+
+    Raises:
+        InputError: There is no such file.
+    """
+    path = files.get(str(name), Path(name))
+    if not is_file(path):
+        remedy = f"{did_you_mean(name, files)}Give a YAML file or one of {', '.join(files)}."
+        raise InputError(name, f"no such {kind}", remedy)
+    return path

@@ -59,11 +59,6 @@ class Extrinsics:
         matrix[:3, 3] = x, y, z
         return cls(matrix)
 
-    @property
-    def inverse(self) -> "Extrinsics":
-        """The motion back."""
-        return Extrinsics(np.linalg.inv(self.matrix).astype(np.float64))
-
     def __call__(self, xyz: NDArray[np.float32]) -> NDArray[np.float32]:
         """Moves points, float32 (N, 3), metres."""
         return to_float32(xyz @ self.matrix[:3, :3].T + self.matrix[:3, 3])
@@ -78,7 +73,7 @@ def read_extrinsics(path: Path) -> Extrinsics:
             points of the sensor into the other frame.
 
     Raises:
-        InputError: A file that is missing or says something else, or a motion that is not rigid.
+        InputError: A file that is missing or has other keys, or a motion that is not rigid.
     """
     document = Entry.of_yaml(path)
     values = document.members()

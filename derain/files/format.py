@@ -16,7 +16,7 @@ from derain.system.registry import Registry
 class Format(ABC):
     """A format of scan files: one file, found by being in `derain.files.formats`.
 
-    A decorator says which suffixes its files have, in lower case::
+    A decorator lists the suffixes of its files, in lower case::
 
         @FORMATS.add(".pcd")
         class Pcd(Format): ...
@@ -68,14 +68,14 @@ class Format(ABC):
         """
 
     def names_columns(self, scan: Scan) -> bool:
-        """Whether a file that a scan is written to says what its columns are called.
+        """Whether a file that a scan is written to names its columns.
 
         A further column in one that does not would be taken for something else by who reads it.
         """
         return True
 
     def count(self, path: Path, columns: Sequence[str]) -> int | None:
-        """Number of points of an uncompressed file where its size tells it, else None.
+        """Number of points of an uncompressed file where its size is enough to know it, else None.
 
         Args:
             path: The file.

@@ -72,17 +72,10 @@ def write_labels(path: Path, semantic: NDArray[Any], instance: NDArray[Any] | No
         instance: Instance ids, integers (N,), 0 to 65,535; None writes 0.
 
     Raises:
-        InputError: An id out of range, another number of instances than classes, or a file that
-            cannot be written.
+        InputError: An id out of range, or a file that cannot be written.
     """
     if instance is None:
         instance = np.zeros_like(semantic)
-    if len(instance) != len(semantic):
-        raise InputError(
-            path,
-            f"{len(instance)} instances for {len(semantic)} classes",
-            "Give one of each per point.",
-        )
     for ids in (semantic, instance):
         if ((ids < 0) | (ids > LARGEST_ID)).any():
             raise InputError(

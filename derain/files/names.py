@@ -1,4 +1,4 @@
-"""What the name of a scan's file says: its format, and the stem that its labels share."""
+"""Parts of the name of a scan's file: the suffix of its format, and the stem of its labels."""
 
 from pathlib import Path
 

@@ -1,6 +1,5 @@
 """Rain by free space: what rays of the scans before and after went through was not there."""
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, Self
@@ -9,14 +8,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.errors import InputError
-from derain.files.documents import shown
-from derain.recordings.evidence import combined_log_odds, vote
-from derain.recordings.known_points import ScanPoints
+from derain.files.documents import Entry
+from derain.recordings.evidence import ScanPoints, combined_log_odds, vote
 from derain.recordings.placing import PlacedFrames, are_placed
 from derain.recordings.rays import RayEvidence, mean_evidence
-from derain.recordings.recording_method import RecordingMethod
-from derain.recordings.registry import METHODS
+from derain.recordings.recording_method import METHODS, RecordingMethod
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
@@ -51,18 +47,11 @@ class Persistence:
     sure: float = 3.0
 
     def __post_init__(self) -> None:
-        for name in ("before", "after"):
-            number: Any = getattr(self, name)  # whatever a user gave
-            whole = isinstance(number, int) and not isinstance(number, bool)
-            if not (whole and 0 <= number <= MOST_SCANS):
-                raise InputError(
-                    "persistence",
-                    f"{name} is {shown(number)}",
-                    f"Give a whole number from 0 to {MOST_SCANS}.",
-                )
-        sure: Any = self.sure
-        if not (isinstance(sure, int | float) and 1 <= sure < math.inf):
-            raise InputError("persistence", f"sure is {shown(sure)}", "Give odds of 1 or more.")
+        for name in ("before", "after"):  # whatever a user gave
+            Entry("persistence", name, getattr(self, name)).whole(0, MOST_SCANS)
+        sure = Entry("persistence", "sure", self.sure)
+        if sure.number() < 1:
+            raise sure.fault(f"{self.sure:g} is not 1 or more", "Give the odds of a sure answer.")
 
 
 @METHODS.add("persistence")
@@ -183,8 +172,9 @@ class PersistenceDerainer(RecordingMethod):
             alone = combined_log_odds(points, evidence)
             agreed = vote(points, alone)
             sure = np.log(self.persistence.sure)
-            known = (evidence is not None) & (np.minimum(agreed, alone) > sure)
-            known |= (evidence is not None) & (np.maximum(agreed, alone) < -sure)
+            surely_rain = (alone > sure) & (agreed > sure)
+            surely_solid = (alone < -sure) & (agreed < -sure)
+            known = (surely_rain | surely_solid) & (evidence is not None)
         with stopwatch.stage("back"):
             judgement = _by_row(scan, points, agreed, known, ready.frame)
         return self.with_warnings(judgement)

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.reading import reading
-from derain.recordings.odometry import FrameOdometry
-from derain.recordings.registration import Registration
+from derain.recordings.odometry import FrameOdometry, Registration
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.recordings import recordings_of

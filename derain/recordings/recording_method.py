@@ -1,10 +1,11 @@
-"""What a method of recordings is that is found by its name."""
+"""What a method of recordings is, and all that there are."""
 
 from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
 from derain.sources.method import Method
+from derain.system.registry import Registry
 
 
 class RecordingMethod(Method):
@@ -38,3 +39,6 @@ class RecordingMethod(Method):
             InputError: A parameter that it does not have, or a value that it cannot have:
                 :func:`derain.system.registry.from_parameters` raises it for a dataclass.
         """
+
+
+METHODS: Registry[type[RecordingMethod]] = Registry("derain.recordings", "derain.methods")

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import ArrayLike
 
-from derain.files.documents import Entry
+from derain.files.documents import Entry, packaged, packaged_or_own
 from derain.files.extrinsics import Extrinsics
-from derain.files.packaged import packaged, packaged_or_own
 from derain.scan import Scan
 from derain.simulation.arrays import Floats, Ints
 from derain.simulation.arrays import Returns as Returns

@@ -14,9 +14,8 @@ from derain.cards.card import load_card
 from derain.errors import InputError
 from derain.files import write_scan
 from derain.files.atomic import replacing
-from derain.files.documents import Entry
+from derain.files.documents import Entry, packaged, packaged_or_own
 from derain.files.labels import write_labels
-from derain.files.packaged import packaged, packaged_or_own
 from derain.scan import Scan
 from derain.simulation.campaign import SplitSequences
 from derain.simulation.classes import TrackClass, unpacked

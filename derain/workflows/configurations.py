@@ -5,8 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from derain.errors import InputError
-from derain.files.documents import Entry
-from derain.files.packaged import packaged
+from derain.files.documents import Entry, packaged
 
 CONFIG_OPTIONS = ("--config", "-c")
 

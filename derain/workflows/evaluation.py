@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from derain.annotation.labelling import TAUGHT_CARD, labels_of
+from derain.annotation.teach import TAUGHT_CARD, labels_of
 from derain.cards.card import DataCard, load_card
 from derain.cards.known import label_of, layouts_for
 from derain.datamodules.taught import Taught

@@ -18,9 +18,8 @@ from derain.errors import InputError
 from derain.files import RECORDS
 from derain.files.atomic import require_writable
 from derain.files.reading import is_file
-from derain.recordings.odometry import FrameOdometry
+from derain.recordings.odometry import FrameOdometry, Registration
 from derain.recordings.posed import ODOMETRY, with_poses
-from derain.recordings.registration import Registration
 from derain.sources.frame import Frame
 from derain.sources.judging import Guard, unguarded
 from derain.sources.recordings import recordings_of

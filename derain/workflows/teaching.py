@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from derain.annotation.labelling import LabelledScan
 from derain.annotation.manifest import HELD_OUT_PART, Manifest
-from derain.annotation.teach import Watch, teach
+from derain.annotation.teach import LabelledScan, Watch, teach
 from derain.cards.card import DataCard
 from derain.evaluation.answers import Answers, TruthRecord
 from derain.jobs.running import Submits

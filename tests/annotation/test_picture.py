@@ -3,11 +3,10 @@
 import warnings
 
 import numpy as np
-import pytest
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba
 
-from derain.annotation.picture import CLASS_COLOURS, SURROUNDINGS, annotation_figure
+from derain.annotation.picture import CLASS_COLOURS, annotation_figure
 from derain.annotation.scene import Box, Scene
 from derain.evaluation.hard_cases import scene
 from derain.fusion import UNKNOWN
@@ -48,20 +47,6 @@ def test_both_panels_and_the_legend_show_every_class_and_valid_point() -> None:
     assert not any(box.overlaps(panel.get_tightbbox()) for panel in figure.axes)
     assert figure.bbox.containsx(box.x0)
     assert figure.bbox.containsx(box.x1)
-
-
-@pytest.mark.parametrize("turned", [False, True], ids=["long road", "wide road"])
-def test_a_metre_is_as_long_in_both_directions_from_above(turned: bool) -> None:
-    road = [(y, x) if turned else (x, y) for x, y in SCENE.road]
-    scan = Scan.of(scene(300)[:, :3])
-    figure = annotation_figure(scan, np.full(300, TrackClass.ROAD), Scene(tuple(road)), "a road")
-    figure.draw_without_rendering()
-    above = figure.axes[0]
-    metres = above.transData.transform([(0, 0), (1, 0), (0, 1)])
-    assert metres[1, 0] - metres[0, 0] == pytest.approx(metres[2, 1] - metres[0, 1])
-    low, high = np.transpose([above.get_xlim(), above.get_ylim()])
-    assert low == pytest.approx(np.min(road, axis=0) - SURROUNDINGS)
-    assert high == pytest.approx(np.max(road, axis=0) + SURROUNDINGS)
 
 
 def test_a_scan_of_nothing_is_drawn_without_a_warning() -> None:

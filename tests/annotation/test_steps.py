@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from derain.annotation.scene import Box, PlaneSearch, Scene
-from derain.annotation.steps import MOST_POINTS, Plane, annotate, find_plane, road_plane
+from derain.annotation.scene import Box, Scene
+from derain.annotation.steps import MOST_POINTS, Plane, annotate, road_plane
 from derain.errors import InputError
-from derain.evaluation.hard_cases import hard_cases
 from derain.fusion import UNKNOWN
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass
@@ -34,34 +33,30 @@ def road(
     return np.column_stack([x, y, z])
 
 
+def plane_of(points: NDArray[np.float64]) -> Plane:
+    return road_plane([Scan.of(points, "scan")], Scene(((-9, -9), (99, -9), (99, 99), (-9, 99))))
+
+
 def test_a_sloping_road_is_found_through_rain_and_heights_are_distances_from_it() -> None:
     rain = np.random.default_rng(1).uniform((2, -4, -1.2), (20, 4, 3), (2000, 3))
     sloping = road(3000, (0.03, -0.02))
-    plane = find_plane(np.concatenate([rain, sloping]), PlaneSearch(), "test")
+    plane = plane_of(np.concatenate([rain, sloping]))
     expected = np.array([-0.03, 0.02, 1]) / np.linalg.norm([-0.03, 0.02, 1])
     np.testing.assert_allclose(plane.normal, expected, atol=1e-3)
     assert plane.slope == pytest.approx(np.degrees(np.arctan(np.hypot(0.03, 0.02))), abs=0.05)
     assert np.abs(plane.height(sloping)).max() < 0.06
     up = np.array(plane.normal)
     np.testing.assert_allclose(plane.height(sloping + 3 * up) - plane.height(sloping), 3)
-
-
-def test_the_same_search_finds_the_same_plane() -> None:
-    points = road(MOST_POINTS + 1)  # more than are looked at
-    first, again, *others = (
-        find_plane(points, PlaneSearch(iterations=20, seed=seed), "test")
-        for seed in (0, 0, *range(1, 9))
-    )
-    assert first == again != others[0]
-    assert min(plane.normal[2] for plane in (first, *others)) > 0.9  # all point up
+    many = road(MOST_POINTS + 1)  # more than are searched
+    assert plane_of(many) == plane_of(many)
 
 
 def test_a_wall_and_too_few_points_are_no_road() -> None:
     with pytest.raises(InputError, match=r"scan: .* (8[0-9]|90) degrees"):
-        find_plane(road(500)[:, [2, 1, 0]], PlaneSearch(), "scan")
-    assert find_plane(road(9), PlaneSearch(), "scan").normal[2] > 0.9
+        plane_of(road(500)[:, [2, 1, 0]])
+    assert plane_of(road(9)).normal[2] > 0.9
     with pytest.raises(InputError, match="8 points over the road are too few"):
-        find_plane(road(8), PlaneSearch(), "scan")
+        plane_of(road(8))
 
 
 def test_the_plane_is_that_of_the_road_of_all_scans_though_a_wall_has_more_points() -> None:
@@ -123,11 +118,3 @@ def test_all_points_together_are_labelled_as_each_alone() -> None:
     together = annotate(Scan(points.astype(np.float32)), SCENE, PLANE)
     assert together.tolist() == [label_of(*point) for point in points.astype(np.float32)]
     assert set(together) >= {0, 1, 2, 3, 7}
-
-
-def test_every_row_of_a_hard_case_gets_a_class() -> None:
-    for name, scan in hard_cases(500):
-        label = annotate(scan, SCENE, PLANE)
-        assert label.shape == (len(scan),), name
-        assert set(label[scan.valid]) <= {*TrackClass, UNKNOWN}, name
-        assert (label[~scan.valid] == UNKNOWN).all(), name

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from window_method import Between, Dimmer
 
-from derain.annotation.labelling import labels_of
 from derain.annotation.manifest import CARD, LABELS, TAUGHT_MANIFEST, Manifest
-from derain.annotation.teach import teach
+from derain.annotation.teach import labels_of, teach
 from derain.cards.card import load_card
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene

@@ -22,8 +22,6 @@ from benchmarks.recorded_bags import (
 )
 from derain.bags import bag as bag_module
 from derain.bags import rosbags_reader
-from derain.bags.bag import Bag
-from derain.bags.bag_copy import BagCopy
 from derain.errors import InputError
 from derain.sources.folders import named_frames
 
@@ -83,7 +81,6 @@ def test_an_encrypted_bag_is_refused(tmp_path: Path) -> None:
         ({"storage_identifier": "rocksdb"}, "rocksdb"),
         ({"version": 99}, "99"),
         ({"relative_file_paths": ["missing.mcap"]}, "missing"),
-        ({"topics_with_message_count": 3}, "cannot be read as a bag"),
     ],
 )
 def test_metadata_that_the_library_does_not_know_is_refused(
@@ -151,20 +148,6 @@ def test_a_topic_with_a_nul_in_its_name_is_refused(tmp_path: Path, storage: Stor
     text = Recorded("/dri\0ver", TEXT_TYPE, START, Ros(storage).text("no cloud"))
     bag = small_bag(tmp_path, storage, more=[text])
     assert "NUL" in refusal(lambda: named_frames([bag]))
-
-
-@pytest.mark.parametrize("name", ["/ros 1/é.drops", "1/2"])
-def test_a_topic_of_an_odd_name_is_read_and_copied(
-    tmp_path: Path, storage: Storage, name: str
-) -> None:
-    ros, (table,) = Ros(storage), tables(1)
-    cloud = Recorded(name, CLOUD_TYPE, START, ros.cloud(table, START))
-    bag = Bag(small_bag(tmp_path, storage, clouds=[], more=[cloud]))
-    assert read_all(bag.path) == 1
-    (tmp_path / "out").mkdir()
-    with BagCopy(bag, bag.cloud_topic(), tmp_path / "out") as copy:
-        made = Bag(copy.finish())
-    assert made.topics == bag.topics
 
 
 def test_more_topics_than_a_recording_has_are_refused(

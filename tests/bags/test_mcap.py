@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mcap.reader import NonSeekingReader, make_reader
 from mcap.writer import CompressionType, IndexType, Writer
-from small_bags import small_bag, tables
+from small_bags import tables
 
 from benchmarks.fuzzing.false_indexes import (
     chunks_times,
@@ -18,7 +18,7 @@ from benchmarks.fuzzing.false_indexes import (
     with_summary,
     without_a_chunk,
 )
-from benchmarks.recorded_bags import CLOUD_TYPE, IMU, POINTS, START, STORAGES, Ros, drive
+from benchmarks.recorded_bags import POINTS, START, Ros, drive
 from derain.bags import mcap_reader
 from derain.bags.bag import Bag
 from derain.bags.bag_copy import BagCopy
@@ -220,14 +220,3 @@ def test_checksums_are_compared(tmp_path: Path, kind: str, changed: bytes, reaso
     bag.write_bytes(content[:place] + b"?" + content[place + 1 :])
     with pytest.raises(InputError, match=f"checksum of {reason}"):
         copied(bag, tmp_path / "out")
-
-
-@pytest.mark.parametrize("storage", STORAGES)
-def test_a_copy_says_what_the_bag_says(tmp_path: Path, storage: Any) -> None:
-    bag = Bag(small_bag(tmp_path, storage))
-    (tmp_path / "out").mkdir()
-    made = Bag(copied(bag.path, tmp_path / "out"))
-    assert made.topics == bag.topics
-    assert {topic.name for topic in made.topics} >= {POINTS, IMU}
-    assert made.cloud_topic().type == CLOUD_TYPE
-    assert [m[1:] for m in made.messages()] == [m[1:] for m in bag.messages()]

@@ -1,6 +1,5 @@
 """Clouds of any fields: what is kept, what goes, and what is refused."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -84,26 +83,6 @@ def test_a_column_more_leaves_the_others_in_their_place(cloud: PointCloud) -> No
     np.testing.assert_array_equal(wider.columns()["probability"], values)
     assert [p[: cloud.point_step] for p in points_of(wider)] == points_of(cloud)
     assert (wider.height, wider.width) == (cloud.height, cloud.width)
-
-
-@pytest.mark.parametrize("big", [False, True])
-def test_an_organised_cloud_can_keep_its_shape(big: bool) -> None:
-    columns = {name: np.arange(6, dtype="f4") for name in "xyz"} | {"r": np.arange(6, dtype="u2")}
-    packed = cloud_of_columns(columns, big)
-    rows = np.frombuffer(packed.data, np.uint8).reshape(2, -1)
-    padded = np.pad(rows, ((0, 0), (0, 5)), constant_values=7).tobytes()
-    cloud = replace(packed, height=2, width=3, row_step=3 * packed.point_step + 5, data=padded)
-    rain = np.array([False, True, False, False, False, True])
-    blank = cloud.blank(rain)
-
-    assert (blank.height, blank.width, blank.row_step) == (2, 3, cloud.row_step)
-    assert blank.is_dense is False
-    for axis in "xyz":
-        assert np.isnan(blank.columns()[axis][rain]).all()
-    np.testing.assert_array_equal(blank.columns()["r"], columns["r"])
-    kept = np.flatnonzero(~rain)
-    assert [points_of(blank)[n] for n in kept] == [points_of(cloud)[n] for n in kept]
-    assert bytes(blank.data).endswith(5 * b"\7")
 
 
 X = (PointField("x", 0, 7, 1),)

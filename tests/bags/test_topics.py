@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from derain.bags.topics import PACKET_DECODERS, POINT_CLOUD, Topic, cloud_topic, decoder_of
+from derain.bags.topics import POINT_CLOUD, Topic, cloud_topic
 from derain.errors import InputError
 
 BAG = Path("drive.mcap")
@@ -46,9 +46,3 @@ def test_a_refusal_names_the_topics_and_what_to_do(
     with pytest.raises(InputError) as error:
         cloud_topic(BAG, topics, name)
     assert not [word for word in words if word not in str(error.value)]
-
-
-def test_vendors_are_known_in_ros_1_and_ros_2() -> None:
-    for type_, decoder in PACKET_DECODERS.items():
-        assert decoder_of(type_) == decoder_of(type_.replace("/", "/msg/")) == decoder
-    assert decoder_of("sensor_msgs/msg/Imu") is None

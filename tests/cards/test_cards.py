@@ -116,21 +116,15 @@ def test_every_channel_has_its_statistics_and_its_unit(card_file: Path) -> None:
 @pytest.mark.parametrize(
     ("key", "value"),
     [
-        *(("classes", value) for value in (None, ["ground", "rain"], {"three": "rain"})),
+        ("classes", {"three": "rain"}),
         ("classes", {0: "ground", 3: "rain", 4: "spray", 10**6: "moon"}),
-        ("classes", {0: "ground", 3: ["rain"], 4: "spray"}),
         ("classes", {0: "rain", 3: "rain", 4: "spray"}),
-        *(("rain", value) for value in (3, [5], [3, math.inf], [[3]], [10**400])),
-        *(("unknown", value) for value in (4, [5], [0, 3])),
-        *(("mean", value) for value in (1, [1, 2, 3], [1, 2, 3, 10**400], list(range(5000)))),
-        *(("std", value) for value in ([1, 1, 1, 0], [1, 1, 1, math.inf], ["a", "b", "c", "d"])),
-        *(("extra", value) for value in (["doppler"], {"doppler": [1]}, {"doppler": None})),
-        ("extra", {"doppler": [1, 0]}),
-        *(("rain_share", value) for value in (1.5, "much")),
-        *(("split", value) for value in (["00"], {"train": "00"}, {"train": [["00"]]})),
-        ("split", {"train": [8]}),  # as YAML reads 010
-        *(("name", {"a": 1}), ("licence", ["free"] * 1000)),
-        *(("simulated", "no"), ("auto_detect", "all"), ("resolution", 5)),
+        *(("rain", value) for value in (3, [5], [3, math.inf])),
+        *(("unknown", value) for value in ([5], [0, 3])),
+        *(("mean", [1, 2, 3]), ("std", [1, 1, 1, 0]), ("extra", {"doppler": [1, 0]})),
+        *(("rain_share", 1.5), ("split", {"train": [8]})),  # as YAML reads 010
+        *(("licence", ["free"] * 1000), ("simulated", "no"), ("auto_detect", "all")),
+        ("resolution", 5),
     ],
     ids=shown,
 )
@@ -138,14 +132,6 @@ def test_a_card_that_makes_no_sense_is_refused(card_file: Path, key: str, value:
     with pytest.raises(InputError, match=rf"yard\.yaml: {key}.*: ") as refusal:
         written(card_file, **{key: value})
     assert len(str(refusal.value)) < len(str(card_file)) + 300
-
-
-@pytest.mark.parametrize("text", ["", "name only", "a: [1", "name: x", "\x00"], ids=repr)
-def test_a_file_that_is_no_card_is_refused_in_one_line(card_file: Path, text: str) -> None:
-    card_file.write_text(text)
-    with pytest.raises(InputError, match=r"yard\.yaml: .") as refusal:
-        load_card(card_file)
-    assert "\n" not in str(refusal.value)
 
 
 def test_an_unknown_name_is_answered_with_the_known_ones() -> None:
@@ -169,15 +155,6 @@ def test_classes_are_rain_unknown_or_neither(card_file: Path) -> None:
         card.rain_of(scan)
     with pytest.raises(InputError, match="rain is missing"):
         written(card_file, "rain")
-
-
-def test_semantickitti_has_the_classes_of_wads_but_for_its_snow() -> None:
-    clean, wads = load_card("semantickitti"), load_card("wads")
-    assert clean.rain == ()
-    assert clean.classes == {id_: n for id_, n in wads.classes.items() if "snow" not in n}
-    sequences = [name for names in clean.split.values() for name in names]
-    assert sorted(sequences) == [f"{number:02d}" for number in range(22)]
-    assert clean.split["validation"] == ("08",)
 
 
 def test_a_card_takes_the_normalisation_of_another_and_stays_itself() -> None:

@@ -19,20 +19,16 @@ def test_a_card_says_where_its_scans_lie(tmp_path: Path) -> None:
     assert layout == Layout(sequences="drives", scans="velodyne", labels="truth", lidar="")
 
 
-@pytest.mark.parametrize("name", ["''", ".", "..", "a/b", "/", "7", "[a]"])
+@pytest.mark.parametrize("name", ["''", "..", "a/b", "7"])
 def test_a_folder_of_a_layout_is_one_name(tmp_path: Path, name: str) -> None:
     (tmp_path / "ours.yaml").write_text(f"{CARD}layout: {{scans: {name}}}")
     with pytest.raises(InputError, match=r"ours\.yaml"):
         load_card(tmp_path / "ours.yaml")
 
 
-def test_every_packaged_layout_is_known_and_the_most_telling_first() -> None:
-    assert set(known_layouts()) == {load_card(name).layout for name in packaged_cards()}
+def test_layouts_that_tell_most_go_first_and_folders_of_the_lidar_before_merged_ones() -> None:
     assert known_layouts()[0] == REHEARSE3D
-    assert len(set(known_layouts())) == len(known_layouts())
-
-
-def test_scans_of_the_lidar_alone_go_before_merged_ones() -> None:
+    assert set(known_layouts()) == {load_card(name).layout for name in packaged_cards()}
     assert lidar_folders() == ("innoviz", "lidar_radar_pcd", "velodyne")
 
 

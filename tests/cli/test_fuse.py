@@ -112,7 +112,7 @@ def test_real_radar_detections_keep_their_doppler_and_rcs(run_fuse: Fuse, shared
     assert is_radar.tolist() == [False] * 40 + [True] * 308
     np.testing.assert_array_equal(fused.fields["doppler"][is_radar], detections[:, 3])
     np.testing.assert_array_equal(fused.fields["rcs"][is_radar], detections[:, 4])
-    back = PLACE.inverse(fused.xyz[is_radar])
+    back = Extrinsics(np.linalg.inv(PLACE.matrix))(fused.xyz[is_radar])
     np.testing.assert_allclose(back, detections[:, :3], atol=1e-4)
 
 

@@ -10,7 +10,7 @@ from window_method import Between
 from derain.annotation.manifest import Manifest
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import read_labels, write_labels
-from derain.recordings.registry import METHODS
+from derain.recordings.recording_method import METHODS
 
 POINTS = 200
 

@@ -2,7 +2,6 @@
 
 import errno
 import os
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -43,31 +42,29 @@ def test_the_file_appears_when_the_block_ends_in_a_folder_that_is_made(tmp_path:
     assert list(path.parent.iterdir()) == [path]
 
 
+FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
 @pytest.mark.parametrize(
-    "error",
+    ("error", "raised"),
     [
-        ZeroDivisionError(),
-        KeyboardInterrupt(),
-        BrokenPipeError(),  # of what the writer prints to, never of the file
-        OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)),
+        (KeyboardInterrupt(), KeyboardInterrupt),
+        (BrokenPipeError(), BrokenPipeError),  # of what the writer prints to, never of the file
+        (FULL, InputError),
     ],
-    ids=repr,
 )
 def test_a_writer_that_fails_leaves_the_old_file_and_no_temporary(
-    tmp_path: Path, error: BaseException
+    tmp_path: Path, error: BaseException, raised: type[BaseException]
 ) -> None:
     path = tmp_path / "scan.bin"
     path.write_bytes(b"old")
-    full = type(error) is OSError
-    with pytest.raises(
-        InputError if full else type(error), match="No space left" if full else None
-    ):
+    with pytest.raises(raised):
         write_half(path, error)
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
 
 
-@pytest.mark.parametrize("mode", [None, 0o600, 0o664, 0o755])
+@pytest.mark.parametrize("mode", [None, 0o600, 0o755])
 def test_a_file_has_the_permissions_of_the_one_before_it_or_of_any_new_one(
     tmp_path: Path, mode: int | None
 ) -> None:
@@ -120,12 +117,6 @@ def test_a_folder_to_be_made_is_looked_at_and_not_made(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
-@pytest.mark.parametrize("name", [f"{'a' * 251}.bin", f".{'é' * 127}"])
-def test_a_name_may_be_as_long_as_names_may_be(tmp_path: Path, name: str) -> None:
-    write(tmp_path / name)
-    assert [path.name for path in tmp_path.iterdir()] == [name]
-
-
 @pytest.mark.parametrize("function", [(os, "open"), (atomic, "lock")], ids=["open", "lock"])
 def test_a_folder_that_was_taken_for_abandoned_is_made_anew(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, function: tuple[Any, str]
@@ -162,8 +153,3 @@ def test_what_a_killed_process_left_goes_where_it_can_be_told_from_what_is_in_us
         assert in_use.exists()
     left = {path.name for path in tmp_path.iterdir()} - {"file.bin"}
     assert left == (set() if locks else {f"{atomic.PREFIX}0.bin", f"{atomic.PREFIX}1"})
-
-
-def test_the_simulation_loads_where_there_are_no_locks() -> None:
-    code = "import sys; sys.modules['fcntl'] = None; import derain.simulation.dataset"
-    subprocess.run([sys.executable, "-c", code], check=True)

@@ -9,16 +9,8 @@ import pytest
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.files import read_scan, write_scan
-from derain.files.columns import columns_of, with_column
+from derain.files.columns import with_column
 from derain.scan import Scan
-
-
-def test_a_scan_from_no_file_keeps_its_coordinates_and_intensity() -> None:
-    scan = Scan.of(scene(10))
-    columns = columns_of(with_column(scan, "ring", np.arange(10)))
-    assert list(columns) == ["x", "y", "z", "intensity", "ring"]
-    np.testing.assert_array_equal(np.stack([columns[axis] for axis in "xyz"], axis=1), scan.xyz)
-    assert scan.fields == {}
 
 
 def test_a_column_of_the_same_name_is_replaced_in_its_place() -> None:
@@ -29,30 +21,20 @@ def test_a_column_of_the_same_name_is_replaced_in_its_place() -> None:
     np.testing.assert_array_equal(scan.fields["ring"], np.arange(10))
 
 
-WITH_NAMES = [".csv", ".ply", ".pcd", ".npz", ".feather"]
+def test_of_names_in_two_cases_the_lower_one_counts(tmp_path: Path) -> None:
+    names = ("X", "y", "z", "x", "i", "Intensity", "intensity")
+    scan = read_scan(written(tmp_path / "scan.csv", names))
+    assert scan.xyz[0].tolist() == [4, 2, 3]
+    assert scan.intensity[0] == 7
 
 
-@pytest.mark.parametrize("suffix", WITH_NAMES)
-@pytest.mark.parametrize(
-    "names", [("X", "y", "z", "x"), ("x", "y", "z", "i", "Intensity", "intensity")]
-)
-def test_of_names_in_two_cases_the_lower_one_counts_in_every_format(
-    tmp_path: Path, suffix: str, names: tuple[str, ...]
-) -> None:
-    path = written(tmp_path / f"scan{suffix}", names)
-    scan = read_scan(path)
-    assert scan.xyz[0].tolist() == [names.index(axis) + 1 for axis in "xyz"]
-    assert scan.intensity is None or scan.intensity[0] == names.index("intensity") + 1
-
-
-@pytest.mark.parametrize("suffix", WITH_NAMES)
 @pytest.mark.parametrize(
     "names", [("x", "y", "z", "Intensity", "INTENSITY"), ("x", "y", "z", "Radar", "RADAR")]
 )
 def test_two_columns_that_differ_in_case_alone_are_refused(
-    tmp_path: Path, suffix: str, names: tuple[str, ...]
+    tmp_path: Path, names: tuple[str, ...]
 ) -> None:
-    path = written(tmp_path / f"scan{suffix}", names)
+    path = written(tmp_path / "scan.csv", names)
     with pytest.raises(InputError, match=f"{names[3]} and {names[4]}") as refused:
         read_scan(path)
     assert str(path) in str(refused.value)
@@ -67,7 +49,7 @@ def test_two_columns_that_differ_in_case_alone_are_refused(
         (".ply", "it", np.zeros((5, 3))),
         (".ply", "it", np.zeros(5, np.int64)),
         *((".csv", name, np.ones(5)) for name in ("#comment", " padded", "two\nlines")),
-        *((".csv", "it", np.ones(5, kind)) for kind in (np.complex64, "U3")),
+        (".csv", "it", np.ones(5, np.complex64)),
         (".csv", "it", np.ones((5, 3))),
         (".feather", "it", np.ones((5, 3))),
     ],
@@ -81,7 +63,7 @@ def test_a_column_that_a_format_cannot_hold_is_refused(
     assert not path.exists()
 
 
-@pytest.mark.parametrize("suffix", WITH_NAMES)
+@pytest.mark.parametrize("suffix", [".csv", ".ply", ".pcd", ".npz", ".feather"])
 def test_a_file_without_coordinates_is_refused(tmp_path: Path, suffix: str) -> None:
     path = written(tmp_path / f"scan{suffix}", ("x", "y", "depth", "ring"))
     with pytest.raises(InputError, match=r"no coordinates|no x, y and z .* \(x, y, depth, ring\)"):

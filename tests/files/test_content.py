@@ -20,10 +20,8 @@ from derain import InputError, Scan
 from derain.evaluation.hard_cases import scene
 from derain.files import read_scan, write_scan
 from derain.files.content import (
-    LARGEST_EXPANSION,
     LARGEST_SCAN,
     SMALLEST_BUDGET,
-    MemoryBudget,
     read_content,
 )
 from derain.files.format import FORMATS
@@ -128,16 +126,6 @@ def test_small_files_cannot_take_much_memory(tmp_path: Path, name: str) -> None:
         assert arrow.max_memory() == before
     finally:
         tracemalloc.stop()
-
-
-@pytest.mark.parametrize("size", [0, 10**6, SMALLEST_BUDGET, LARGEST_SCAN])
-def test_room_grows_with_the_file_between_two_bounds(size: int) -> None:
-    budget = MemoryBudget(size)
-    most = min(max(SMALLEST_BUDGET, LARGEST_EXPANSION * size), LARGEST_SCAN)
-    budget.reserve(most - 1)
-    budget.reserve(1)
-    with pytest.raises(ValueError, match="room for 0"):
-        budget.reserve(1)
 
 
 def test_what_compresses_as_well_as_real_scans_and_better_is_read(tmp_path: Path) -> None:

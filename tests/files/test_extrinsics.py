@@ -29,14 +29,6 @@ def test_a_pose_turns_about_fixed_axes_and_then_moves(pose: tuple[float, ...]) -
     np.testing.assert_allclose(moved, expected, atol=1e-5)
 
 
-@given(poses)
-def test_the_inverse_leads_back(pose: tuple[float, ...]) -> None:
-    extrinsics = Extrinsics.of_pose(*pose)
-    back = extrinsics.inverse(extrinsics(POINTS))
-    # Two roundings of numbers up to 200 to float32.
-    np.testing.assert_allclose(back, POINTS, atol=4 * 200 * np.finfo(np.float32).eps)
-
-
 def test_a_file_holds_a_pose_or_a_matrix(tmp_path: Path) -> None:
     pose = dict(zip(POSE, (0.5, -0.2, -0.7, 1, -2, 30), strict=True))
     (tmp_path / "pose.yaml").write_text(yaml.safe_dump(pose))
@@ -60,27 +52,21 @@ def rigid(**changes: float) -> list[list[float]]:
     ("content", "reason"),
     [
         ("", "it is empty"),
-        ("- 1", "[1] is not a mapping"),
-        ("{x: 1}", "its keys are x"),
         ("{x: 0, y: 0, z: 0, roll: 0, pitch: 0, yaws: 0}", "pitch, yaws"),
         ("{x: 0, y: 0, z: 0, roll: 0, pitch: 0, yaw: left}", "yaw: 'left' is not a finite number"),
-        ("matrix: 5", "matrix: 5 is not a list"),
         ("matrix: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]", "matrix[0]: [1, 0, 0] are not 4 numbers"),
         *(
             (yaml.safe_dump({"matrix": matrix}), "matrix: not a rotation and a translation")
             for matrix in (
-                [],
                 [[1, 0, 0, 0]],
                 *(rigid(at_00=value) for value in (-1.0, 0.0, 1.01)),
                 rigid(at_01=0.1),
                 # Products of these are infinite, and their sum is not a number.
                 rigid(at_00=1e200, at_01=1e200, at_10=1e200, at_11=-1e200),
                 rigid(at_30=2.0),
-                rigid(at_33=2.0),
             )
         ),
         (yaml.safe_dump({"matrix": rigid(), "x": 1}), "its keys are matrix, x"),
-        (yaml.safe_dump({"matrix": rigid(at_03=float("nan"))}), "nan is not a finite number"),
     ],
 )
 def test_what_is_no_rigid_motion_is_refused_in_one_line(

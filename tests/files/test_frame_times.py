@@ -30,32 +30,23 @@ def test_a_scan_has_the_time_of_the_line_with_its_name(
     assert read_frame_times(scans).tolist() == times
 
 
-@pytest.mark.parametrize("frame", ["000012.bin", "000012", "12", "000012.pcd", " 12"])
+@pytest.mark.parametrize("frame", ["000012.bin", "12", "000012.pcd", " 12"])
 def test_suffix_and_zeros_before_a_name_make_no_difference(tmp_path: Path, frame: str) -> None:
-    scans = written(tmp_path, f"timestamp,frame\n5,{frame}\n6,0\n", "000012.bin", "000000.bin")
-    assert read_frame_times(scans).tolist() == [5, 6]
-
-
-def test_columns_of_other_names_can_be_stated(tmp_path: Path) -> None:
-    scans = written(tmp_path, "\ufeffstem,camera,seconds\na,1,2.5\n", "a.bin")
-    assert read_frame_times(scans, ["stem", "seconds"]).tolist() == [2.5]
+    text = f"\ufeffseconds,camera,stem\n5,1,{frame}\n6,1,0\n"
+    scans = written(tmp_path, text, "000012.bin", "000000.bin")
+    assert read_frame_times(scans, ["stem", "seconds"]).tolist() == [5, 6]
 
 
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("", r"has no columns frame and timestamp \(\)"),
         ("frame,time\n0,1\n", r"has no columns frame and timestamp \(frame, time\)"),
         ("frame,timestamp\n1,1\n", r"has no line for 000000\.bin"),
         ("frame,timestamp\n0,soon\n", "'soon' is not a time"),
         ("frame,timestamp\n0,nan\n", "'nan' is not a time"),
-        ("frame,timestamp\n0,-inf\n", "'-inf' is not a time"),
-        (f"frame,timestamp\n0,1{'0' * 400}\n", "'1000"),
         (f"frame,timestamp\n0,{'a' * 10**5}\n", "'aaaa"),
         (f"frame,timestamp\n0,{'1' * 10**6}\n", "cannot be read as"),
         (f"frame,timestamp\n{'0,1' * 3 * 2**20}", "cannot be read as .csv .9,437,200 bytes"),
-        (",".join(map(str, range(10**5))), "has no columns frame and timestamp"),
-        ("frame,timestamp\n0,\n", "'' is not a time"),
         ("frame,timestamp\n0\n", "'' is not a time"),
         ("timestamp,frame\n1\n", "has a line that names no scan"),
         ("frame,timestamp\n0,1\n000.pcd,2\n", r"gives 000\.pcd two times"),

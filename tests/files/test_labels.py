@@ -31,12 +31,6 @@ def test_both_halves_come_back(tmp_path: Path, raw: np.ndarray) -> None:
     np.testing.assert_array_equal(read_labels(path, len(raw)), raw)
 
 
-def test_a_mask_is_written_as_classes_0_and_1(tmp_path: Path) -> None:
-    path = tmp_path / "scan.label"
-    write_labels(path, np.array([True, False, True]))
-    assert read_labels(path, 3).tolist() == [1, 0, 1]
-
-
 @pytest.mark.parametrize(
     ("size", "found"), [(8, "2"), (16, "4"), (13, "3.25"), (0, "0"), (2**42, r"1\.09951e\+12")]
 )
@@ -57,8 +51,3 @@ def test_an_id_that_needs_more_than_16_bits_is_not_written(tmp_path: Path, label
         with pytest.raises(InputError, match="outside 0 to 65535"):
             write_labels(tmp_path / "scan.label", *halves)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_another_number_of_instances_than_classes_is_not_written(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="2 instances for 3 classes"):
-        write_labels(tmp_path / "scan.label", np.zeros(3, np.int64), np.zeros(2, np.int64))

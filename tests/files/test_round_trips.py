@@ -9,11 +9,15 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from derain import Scan
+from derain import InputError, Scan
+from derain.evaluation.hard_cases import scene
 from derain.files import DEFAULT_COLUMNS, read_scan, write_scan
 from derain.files.columns import scan_of
 from derain.files.formats.pcd import ENCODINGS, VALUE_TYPES, PcdHeader
 from derain.files.formats.ply import BYTE_ORDERS, PlyHeader
+
+from .formats.test_las import STREET
+from .formats.test_las import write as write_survey
 
 FLOATS = ("f4", "f8")
 TEXT_TYPES = (*VALUE_TYPES, "b1", "f2")
@@ -151,3 +155,17 @@ def test_feather(tmp_path: Path, scan: Scan, data: st.DataObject) -> None:
     stay = data.draw(arrays(bool, len(scan)))
     write_scan(path, read_scan(path).take(stay))
     check_same(read_scan(path), scan.take(stay))
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".npy", ".pcd", ".ply", ".feather", ".las", ".laz"])
+def test_a_file_that_is_cut_off_is_refused(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"scan{suffix}"
+    if suffix in (".las", ".laz"):
+        write_survey(path, STREET)
+    else:
+        write_scan(path, scene(90))
+    content = path.read_bytes()
+    for size in (0, 1, 5, 20, 200, 300):
+        path.write_bytes(content[:size])
+        with pytest.raises(InputError, match=rf"cannot be read as \{suffix}"):
+            read_scan(path)

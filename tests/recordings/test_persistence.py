@@ -89,27 +89,6 @@ def test_it_finds_drops_and_leaves_walls(posed: bool) -> None:
         assert (answer.rain == (answer.probability > 0.5) & answer.known).all()
 
 
-def test_a_thing_that_stays_is_less_like_rain_than_one_that_comes_and_goes() -> None:
-    frames = drive()
-    sphere = np.random.default_rng(3).normal(0, 1, (40, 3))
-    thing = np.array([5.0, 1.0, 0.5]) + 0.2 * sphere / np.linalg.norm(sphere, axis=1)[:, None]
-    here = [Scan.of(np.concatenate([thing, seen_from(0, number)])) for number in range(3)]
-    gone = [here[1] if number == 1 else Scan.of(seen_from(0, number)) for number in range(3)]
-    probabilities = []
-    for scans in (here, gone):
-        frames = [MemoryFrame(key=str(n), number=n, scan=scan) for n, scan in enumerate(scans)]
-        probabilities.append(judged(frames)[1].probability[: len(thing)].mean())
-    assert probabilities[0] < probabilities[1] - 0.3
-
-
-def test_a_wider_window_asks_more_scans() -> None:
-    method = PersistenceDerainer(Persistence(before=2, after=3))
-    assert (method.window.before, method.window.after) == (2, 3)
-    answers = judged(drive(5), before=2, after=3)
-    assert len(answers) == 5
-    assert recall_and_false(answers[2])[0] > 0.8
-
-
 def test_of_a_scan_alone_nothing_is_known_and_nothing_is_taken() -> None:
     (answer,) = judged(drive(1))
     assert answer.known is not None
@@ -195,12 +174,10 @@ def test_hard_cases_are_answered() -> None:
 @pytest.mark.parametrize(
     ("parameters", "told"),
     [
-        ({"before": -1}, "before is -1"),
-        ({"after": 51}, "after is 51"),
-        ({"before": 1.5}, "before is 1.5"),
-        ({"before": True}, "before is True"),
-        ({"sure": 0.5}, "sure is 0.5"),
-        ({"sure": "much"}, "sure is"),
+        ({"before": -1}, "before: -1 is not"),
+        ({"after": 51}, "after: 51 is not"),
+        ({"sure": 0.5}, "sure: 0.5 is not"),
+        ({"sure": "much"}, "sure: 'much' is not"),
         ({"reach": 3}, "it has no parameter reach. It has before, after, sure."),
     ],
 )
@@ -208,13 +185,6 @@ def test_wrong_parameters_are_refused(parameters: dict[str, object], told: str) 
     with pytest.raises(InputError) as refused:
         load_method("persistence", parameters)
     assert told in str(refused.value)
-
-
-def test_what_it_says_of_itself_makes_it_again() -> None:
-    content = PersistenceDerainer(Persistence(before=2, sure=9.0)).as_dict()
-    again = load_method(content.pop("method"), content)
-    assert isinstance(again, PersistenceDerainer)
-    assert again.persistence == Persistence(before=2, sure=9.0)
 
 
 def test_real_snow_is_found_by_free_space(shared: Path) -> None:
@@ -241,3 +211,5 @@ def test_it_can_be_pickled_and_begins_a_recording_of_its_own() -> None:
     method.push(scene(100))
     again = pickle.loads(pickle.dumps(method))
     assert (again.persistence, again.threads, again.waiting) == (method.persistence, 1, 0)
+    content = method.as_dict()
+    assert load_method(content.pop("method"), content).persistence == method.persistence

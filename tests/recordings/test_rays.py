@@ -15,7 +15,6 @@ from derain.recordings.rays import (
     WITHIN,
     WITHIN_STEPS,
     Rays,
-    range_of,
     ray_evidence,
 )
 
@@ -48,31 +47,6 @@ def test_rays_end_at_a_wall_and_go_through_a_drop_before_it() -> None:
     assert evidence.through[of_drop] == pytest.approx(1)
     assert evidence.ending[~of_drop] == pytest.approx(1)
     assert (evidence.through[~of_drop] == 0).all()
-
-
-def test_a_sensor_that_moved_sees_the_same() -> None:
-    motion = moved(1.3, 0.02)
-    drop = np.array([[6.0, 0.03, 0.02]])
-    before = wall(20)
-    after = (np.concatenate([before, drop]) - motion[:3, 3]) @ motion[:3, :3]
-    places = after @ motion[:3, :3].T + motion[:3, 3]
-    evidence = ray_evidence(places, Rays(before, 1), STEP)
-    middle = np.abs(after[:, 1]) < 1
-    assert evidence.through[-1] == pytest.approx(1)
-    assert np.median(evidence.ending[middle]) == pytest.approx(1)
-
-
-def test_a_ray_that_comes_back_tells_more_than_those_around_it() -> None:
-    twig = wall(10)[[500]] * 0.6
-    again = np.delete(wall(10), 500, axis=0)  # the ray to the twig ends there, not at the wall
-    evidence = ray_evidence(twig, Rays(np.concatenate([again, twig]), 1), STEP)
-    assert evidence.ending[0] > 0.4 > 1 / RAYS
-
-
-def test_what_stands_before_a_place_says_nothing_of_it() -> None:
-    evidence = ray_evidence(wall(20), Rays(wall(10), 1), STEP)
-    assert not evidence.ending.any()
-    assert not evidence.through.any()
 
 
 def test_where_there_are_no_rays_nothing_is_said() -> None:
@@ -109,10 +83,6 @@ def test_it_is_what_asking_every_ray_says(seed: int) -> None:
         ending = heard[np.abs(behind) <= at].sum() / total
         assert evidence.ending[number] == pytest.approx(ending)
         assert evidence.through[number] == pytest.approx(heard[behind > through].sum() / total)
-
-
-def test_a_range_is_never_nothing() -> None:
-    assert (range_of(np.zeros((2, 3))) > 0).all()
 
 
 def test_a_ray_that_ends_at_a_drop_shows_nothing_solid() -> None:

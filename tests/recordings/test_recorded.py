@@ -1,7 +1,6 @@
 """A model over a recording: rays of other scans speak for drops, against walls, or not at all."""
 
 import gc
-import pickle
 import weakref
 from collections.abc import Sequence
 from dataclasses import replace
@@ -18,7 +17,6 @@ from derain.sources.frame import MemoryFrame
 from derain.sources.judgement import Judgement
 from derain.sources.judging import Failures, judgements
 from derain.system.stopwatch import Stopwatch
-from derain.views.window import Window
 
 from .test_persistence import drive, is_drop
 
@@ -68,16 +66,6 @@ def test_drops_become_likelier_and_walls_less_likely(
         assert (judgement.probability[alone < 0.01] == alone[alone < 0.01]).all()
         assert (judgement.probability[drop] > 0.3).mean() > 0.7
         assert (judgement.probability[~drop & (alone > 0.01)] < 0.3).mean() > 0.8
-
-
-def test_each_scan_is_judged_once_and_in_order(model: Derainer) -> None:
-    frames = drive()
-    answers = judged(model, frames)
-    assert [answer.frame for answer in answers] == frames
-    assert [len(answer.rain) for answer in answers] == [len(frame.scan) for frame in frames]
-    for answer in answers:
-        expected = answer.probability > model.spec.threshold
-        np.testing.assert_array_equal(answer.rain, expected)
 
 
 def test_without_anything_to_go_by_it_is_the_model(model: Derainer) -> None:
@@ -139,19 +127,6 @@ def test_a_scan_that_fails_is_named_once_to_those_beside_it(model: Derainer) -> 
     with pytest.warns(ScanWarning) as caught:
         list(judgements(RecordedDerainer(model, 1, 1), frames, failures.skipping_failures))
     assert sum(FAILS in str(warning.message) for warning in caught) == 1
-
-
-def test_a_copy_begins_a_recording_of_its_own(model: Derainer) -> None:
-    method = RecordedDerainer(model, past=2, delay=1)
-    method.push(drive(1)[0])
-    copy = pickle.loads(pickle.dumps(method))
-    assert (copy.window, copy.waiting, method.waiting) == (Window(2, 1), 0, 1)
-    assert copy.as_dict() == model.as_dict() | {"past": 2, "delay": 1}
-
-
-def test_impossible_windows_are_refused(model: Derainer) -> None:
-    with pytest.raises(InputError, match="-1 scans before"):
-        RecordedDerainer(model, past=-1)
 
 
 def test_where_no_ray_is_near_nothing_is_added() -> None:

@@ -6,7 +6,7 @@ from window_method import Between, Dimmer
 from derain.errors import InputError
 from derain.export.methods import load_method, load_method_of_one_scan
 from derain.export.runtimes.session import Runtime
-from derain.recordings.registry import METHODS
+from derain.recordings.recording_method import METHODS
 
 
 @pytest.fixture
@@ -33,12 +33,3 @@ def test_what_it_cannot_do_is_one_error() -> None:
         load_method_of_one_scan("between", {})
     with pytest.raises(InputError, match=r"one of .*dror.*, between"):
         load_method("nobody", {})
-
-
-@pytest.mark.usefixtures("between")
-@pytest.mark.parametrize("command", ["run", "teach"])
-def test_help_lists_it(run_derain, command: str) -> None:
-    told = run_derain(command, "--help").out
-    lines = [line.split(maxsplit=1) for line in told.splitlines()]
-    assert ["between", "rain is what is dim between two scans"] in lines
-    assert "dror" in [name for name, *_ in filter(None, lines)]

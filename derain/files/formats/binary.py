@@ -18,10 +18,10 @@ from derain.scan import LARGEST_COORDINATE, LARGEST_VALUE, SENTINEL, Scan
 # real scans of six sensors. The few radar points of a fused scan, perhaps in dB, are far fewer.
 LARGEST_NEGATIVE_SHARE = 0.1
 
-# float64 is told from float32 by its numbers: read as the other type, many are beyond any sensor's
-# reach, or nearer to 0 than anyone measures. HEAD: bytes of the file that are looked at.
-# FEWEST_ROWS: with fewer, nothing can be told. SMALLEST_VALUE: what is nearer to 0 is not measured.
-# LARGEST_ODD_SHARE: a larger share of rows with such numbers is no chance.
+# Whether a file is float64 or float32 follows from its numbers: read as the other type, many are
+# beyond any sensor's reach, or nearer to 0 than anyone measures. HEAD: bytes of the file that are
+# looked at. FEWEST_ROWS: with fewer, nothing follows. SMALLEST_VALUE: what is nearer to 0 is not
+# measured. LARGEST_ODD_SHARE: a larger share of rows with such numbers is no chance.
 HEAD = 2**16
 FEWEST_ROWS = 8
 SMALLEST_VALUE = 1e-12
@@ -118,7 +118,7 @@ class Binary(Format):
 
 
 def _value_type(head: bytes, size: int, columns: Sequence[str]) -> str:
-    """Type of the numbers of a file: "<f8" where they say so, else "<f4".
+    """Type of the numbers of a file: "<f8" or "<f4".
 
     Args:
         head: The first HEAD bytes of the file.

@@ -2,7 +2,7 @@
 
 Source: Apache Arrow, "Arrow Columnar Format", version 1.5, section on IPC, and its
 format/Message.fbs: the numbers of the tables' members, and the eight bytes before a compressed
-buffer that say its size.
+buffer that hold its size.
 """
 
 import struct
@@ -38,7 +38,7 @@ _SIZE = struct.Struct("<q")
 
 @dataclass(frozen=True, eq=False)
 class FeatherHeader:
-    """What a Feather file holds besides numbers: text, missing values, what the schema says.
+    """What a Feather file holds besides numbers: text, missing values, the metadata of the schema.
 
     Attributes:
         table: The file, a pyarrow.Table with a row for each point.
@@ -168,7 +168,7 @@ def _take(batch: Any, body: memoryview, budget: MemoryBudget) -> None:
         begin, length = _BUFFER.unpack_from(batch.Bytes, first + number * _BUFFER.size)
         if length > 0:
             (size,) = _SIZE.unpack_from(body, begin)
-            budget.reserve(max(size, 0))  # -1 says that the buffer is not compressed
+            budget.reserve(max(size, 0))  # -1 of a buffer that is not compressed
 
 
 def _member(table: Any, number: int) -> Any:

@@ -51,7 +51,7 @@ _FINEST_SCALE = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class LasHeader:
-    """What a LAS file says besides its points.
+    """The content of a LAS file besides its points.
 
     Attributes:
         header: laspy's.
@@ -219,7 +219,7 @@ def _check_chunks(content: Content, record: bytes, size: int, begin: int) -> Non
 
     Args:
         content: The file.
-        record: The variable-length record that says how the points are compressed.
+        record: The variable-length record of how the points are compressed.
         size: Bytes of a point.
         begin: Where the compressed points begin.
 

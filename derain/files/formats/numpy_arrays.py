@@ -149,7 +149,7 @@ class Npz(Format):
 
 
 def _array(data: bytes) -> NDArray[Any]:
-    """The array of a .npy file, if the file is as long as its header says."""
+    """The array of a .npy file, if the file is as long as its header states."""
     file = io.BytesIO(data)
     # The third version differs from the second in the encoding of names alone.
     read_header = (
@@ -239,17 +239,10 @@ def _grid(path: Path, arrays: Mapping[str, NDArray[Any]]) -> tuple[int, ...]:
 
 def _organised(path: Path, grid: tuple[int, ...]) -> tuple[int, int] | None:
     """(height, width) if the points lie on a grid of two axes."""
-    match grid:
-        case (_,):
-            return None
-        case (height, width):
-            return height, width
-        case _:
-            raise InputError(
-                path,
-                f"points lie in an array of {len(grid)} axes",
-                "Give a list of points, or a grid of rows and columns.",
-            )
+    if len(grid) not in (1, 2):
+        reason = f"points lie in an array of {len(grid)} axes"
+        raise InputError(path, reason, "Give a list of points, or a grid of rows and columns.")
+    return (grid[0], grid[1]) if len(grid) == 2 else None
 
 
 def _gridded(scan: Scan, column: NDArray[Any]) -> NDArray[Any]:

@@ -33,7 +33,7 @@ _DATA_LINE = re.compile(rb"^DATA[ \t]+(\w+)[ \t]*\r?(?:\n|\Z)", re.MULTILINE)
 
 @dataclass(frozen=True)
 class PcdHeader:
-    """What a PCD file says about its points.
+    """The header of a PCD file.
 
     Attributes:
         columns: Name and dtype of every column in the file's order, padding included; the dtype of
@@ -132,7 +132,7 @@ def _parse_header(content: bytes) -> tuple[PcdHeader, bytes]:
         The header, and the bytes after its last line.
 
     Raises:
-        ValueError: A header that is missing, incomplete or says what no PCD can mean.
+        ValueError: A header that is missing, incomplete or contradictory.
     """
     end = _DATA_LINE.search(content, 0, LARGEST_HEADER)
     if end is None:
@@ -141,7 +141,7 @@ def _parse_header(content: bytes) -> tuple[PcdHeader, bytes]:
     entries = {decode(line[0]): [decode(word) for word in line[1:]] for line in lines if line}
     encoding = decode(end[1])
     if encoding not in ENCODINGS:
-        raise ValueError(f"the header says DATA {encoding}")
+        raise ValueError(f"the header states DATA {encoding}")
     (width,) = _numbers("WIDTH", entries.get("WIDTH", []), length=1)
     (height,) = _numbers("HEIGHT", entries.get("HEIGHT", ["1"]), length=1)
     (points,) = _numbers("POINTS", entries.get("POINTS", [str(width * height)]), length=1)
@@ -155,24 +155,24 @@ def _stated_columns(entries: dict[str, list[str]]) -> tuple[tuple[str, np.dtype[
     check_columns(len(names))
     named = [name for name in names if name != PADDING]
     if not named or len(set(named)) < len(named):
-        raise ValueError(f"the header says FIELDS {_join(names)}")
+        raise ValueError(f"the header states FIELDS {_join(names)}")
     types = entries.get("TYPE", [])
     sizes = _numbers("SIZE", entries.get("SIZE", []), len(names))
     counts = _numbers("COUNT", entries.get("COUNT", ["1"] * len(names)), len(names))
     if len(types) != len(names):
-        raise ValueError(f"the header says TYPE {_join(types)} for {len(names)} fields")
+        raise ValueError(f"the header states TYPE {_join(types)} for {len(names)} fields")
     columns = []
     for name, kind, size, count in zip(names, types, sizes, counts, strict=True):
         value = f"{kind.lower()}{size}"
         if value not in VALUE_TYPES or not 0 < count <= LARGEST_SCAN // MOST_COLUMNS // size:
-            raise ValueError(f"the header says TYPE {kind} SIZE {size} COUNT {count} for {name}")
+            raise ValueError(f"the header states TYPE {kind} SIZE {size} COUNT {count} for {name}")
         columns.append((name, np.dtype((f"<{value}", () if count == 1 else (count,)))))
     return tuple(columns)
 
 
 def _numbers(key: str, words: list[str], length: int) -> list[int]:
     if len(words) != length or not all(word.isdecimal() for word in words):
-        raise ValueError(f"the header says {key} {_join(words)}")
+        raise ValueError(f"the header states {key} {_join(words)}")
     return [int(word) for word in words]
 
 

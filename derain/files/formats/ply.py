@@ -76,11 +76,6 @@ class Element:
         """How many lines of text (ascii) or bytes (binary) an element without lists takes."""
         return self.count * (1 if encoding == "ascii" else self.row(encoding).itemsize)
 
-    @property
-    def lists(self) -> list[Property]:
-        """The properties that hold a list for each row."""
-        return [each for each in self.properties if each.length is not None]
-
     def row(self, encoding: str, list_length: int | None = None) -> np.dtype[Any]:
         """Dtype of a row. A list has two fields: "length of <name>", and its values as <name>.
 
@@ -108,7 +103,7 @@ class Faces:
     """Faces that all have as many vertices.
 
     Attributes:
-        element: What the header says of them.
+        element: Their name, number and properties, of which the first lists their vertices.
         table: A row for each face, structured (F,), as `Element.row` gives it.
         points: Number of vertices that they are numbered among.
     """
@@ -127,7 +122,7 @@ class Faces:
         kept = np.arange(self.points)[rows]
         number = np.full(self.points, -1)
         number[kept[::-1]] = np.arange(len(kept))[::-1]
-        name = self.element.lists[0].name
+        name = self.element.properties[0].name
         vertices = number[self.table[name]]
         stay = (vertices >= 0).all(axis=1)
         table = self.table[stay]
@@ -137,7 +132,7 @@ class Faces:
 
 @dataclass(frozen=True)
 class PlyHeader:
-    """What a PLY file says besides its vertices.
+    """The content of a PLY file besides its vertices.
 
     Attributes:
         encoding: One of BYTE_ORDERS.
@@ -210,7 +205,7 @@ class Ply(Format):
 
 
 def _parse(content: bytes) -> tuple[PlyHeader, NDArray[Any]]:
-    """What a file says besides its vertices, and the vertices, structured (N,)."""
+    """The content of a file besides its vertices, and the vertices, structured (N,)."""
     encoding, comments, elements, data = _parse_header(content)
     names = [element.name for element in elements]
     if "vertex" not in names:
@@ -229,14 +224,14 @@ def _parse(content: bytes) -> tuple[PlyHeader, NDArray[Any]]:
 
 
 def _parse_header(content: bytes) -> tuple[str, tuple[str, ...], list[Element], bytes]:
-    """What the header of a file says.
+    """The parts of a file's header.
 
     Returns:
         The encoding; lines of comments and object information; the elements in the file's order;
         and the data behind it.
 
     Raises:
-        ValueError: A header that is missing, incomplete or says what no PLY can mean.
+        ValueError: A header that is missing, incomplete or contradictory.
     """
     end = _END.search(content, 0, LARGEST_HEADER)
     if end is None or not content.startswith(b"ply"):
@@ -296,7 +291,7 @@ def _read_faces(
     """Reads an element that may be faces.
 
     Args:
-        element: What the header says of it.
+        element: Its name, properties and number of rows.
         points: Number of vertices.
         encoding: Encoding of the file.
         data: Data of the file.
@@ -304,9 +299,16 @@ def _read_faces(
 
     Returns:
         The faces; None for something else, or for what cannot be renumbered: faces of unequal
-        numbers of vertices, of vertices that are not there, or cut off.
+        numbers of vertices, of vertices that are not there, whose vertices are not their first
+        property, or cut off.
     """
-    if [each.name in _LISTS and _whole(each) for each in element.lists] != [True]:
+    if not element.properties:
+        return None
+    vertices, *others = element.properties
+    if vertices.name not in _LISTS or any(each.length for each in others):
+        return None
+    kinds = vertices.kind[0], (vertices.length or "")[:1]
+    if not set(kinds) <= {"i", "u"}:  # whole numbers, and a whole number of them
         return None
     try:
         length = _first_length(element, encoding, data, start)
@@ -315,9 +317,8 @@ def _read_faces(
         table = _read_rows(data, encoding, element.row(encoding, length), start, element.count)
     except (ValueError, IndexError):
         return None
-    name = element.lists[0].name
-    alike = (table[f"length of {name}"] == length).all()
-    there = ((table[name] >= 0) & (table[name] < points)).all()
+    alike = (table[f"length of {vertices.name}"] == length).all()
+    there = ((table[vertices.name] >= 0) & (table[vertices.name] < points)).all()
     return Faces(element, table, points) if alike and there else None
 
 
@@ -325,14 +326,7 @@ def _first_length(element: Element, encoding: str, data: bytes, start: int) -> i
     """Number of vertices of the first face."""
     if element.count == 0:
         return 0
-    place = element.properties.index(element.lists[0])
     if encoding == "ascii":
-        return int(next(filled_lines(data, start), b"").split()[place])
-    first = Element(element.name, 1, element.properties[:place])
-    row = element.row(encoding, 0)
-    return int(np.frombuffer(data, row[place], 1, start + first.row(encoding).itemsize)[0])
-
-
-def _whole(property_: Property) -> bool:
-    """Whether a list holds whole numbers, and a whole number of them."""
-    return property_.kind[0] in "iu" and (property_.length or "")[0] in "iu"
+        return int(next(filled_lines(data, start), b"").split()[0])
+    length = f"{BYTE_ORDERS[encoding]}{element.properties[0].length}"
+    return int(np.frombuffer(data, length, 1, start)[0])

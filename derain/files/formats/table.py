@@ -8,6 +8,7 @@ import csv
 import io
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import chain, islice
 from pathlib import Path
@@ -225,7 +226,7 @@ def _parse_lines(
         ValueError: Lines of different lengths, or values that are not numbers.
         csv.Error: Quotes that do not match.
     """
-    columns = [_Numbers() for _ in titles]
+    columns: list[list[NDArray[Any]]] = [[] for _ in titles]
     spans = [np.empty((0, 2), np.int64)]
     while chunk := list(islice(lines, _CHUNK)):
         rows = list(_rows((line.text for line in chunk), separator))
@@ -237,39 +238,36 @@ def _parse_lines(
                     f"line {line.number} has {len(row)} values for {len(titles)} columns"
                 )
         for title, column, texts in zip(titles, columns, zip(*rows, strict=True), strict=True):
-            if (odd := column.add(texts)) is not None:
-                raise ValueError(
-                    f"line {chunk[odd].number}: {title} is '{texts[odd]}', not a number"
-                )
-        spans.append(np.array([(line.begin, line.end) for line in chunk]))
-    return [column.values() for column in columns], np.concatenate(spans)
-
-
-class _Numbers:
-    """The numbers of one column: whole ones, as long as all are, and floating-point ones."""
-
-    def __init__(self) -> None:
-        self._whole: dict[type[Any], list[NDArray[Any]]] = {np.int64: [], np.uint64: []}
-        self._floating = [np.empty(0)]
-
-    def add(self, texts: Sequence[str]) -> int | None:
-        """Appends numbers; returns the place of the first text that is none."""
-        for kind in list(self._whole):
             try:
-                self._whole[kind].append(np.fromiter(map(int, texts), kind, len(texts)))
-            except (ValueError, OverflowError):
-                del self._whole[kind]
-        try:
-            self._floating.append(np.fromiter(map(_number, texts), np.float64, len(texts)))
-        except ValueError:
-            return next(place for place, text in enumerate(texts) if not _is_number(text))
-        return None
+                column.append(_numbers(texts))
+            except ValueError:
+                odd = next(place for place, text in enumerate(texts) if not _is_number(text))
+                reason = f"line {chunk[odd].number}: {title} is '{texts[odd]}', not a number"
+                raise ValueError(reason) from None
+        spans.append(np.array([(line.begin, line.end) for line in chunk]))
+    return [_joined(column) for column in columns], np.concatenate(spans)
 
-    def values(self) -> NDArray[Any]:
-        """All of them: int64, or uint64 if only that holds them, or else float64."""
-        return np.concatenate(
-            next((whole for whole in self._whole.values() if whole), self._floating)
-        )
+
+def _numbers(texts: Sequence[str]) -> NDArray[Any]:
+    """The numbers of some texts: int64, or uint64 if only that holds them, or else float64.
+
+    Raises:
+        ValueError: A text that is no number.
+    """
+    for kind in (np.int64, np.uint64):
+        with suppress(ValueError, OverflowError):
+            return np.fromiter(map(int, texts), kind, len(texts))
+    return np.fromiter(map(_number, texts), np.float64, len(texts))
+
+
+def _joined(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    """The parts of a column as one, of a type as for `_numbers`."""
+    if not parts:
+        return np.empty(0)
+    kinds = {part.dtype.kind for part in parts}
+    if kinds == {"i", "u"} and all(part.min() >= 0 for part in parts):
+        return np.concatenate(parts, dtype=np.uint64, casting="unsafe")
+    return np.concatenate(parts)  # of whole numbers and others, or of both signs: float64
 
 
 def _rows(lines: Iterable[str], separator: str | None) -> Iterator[list[str]]:

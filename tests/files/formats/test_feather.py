@@ -8,7 +8,7 @@ import pyarrow
 import pytest
 from pyarrow import feather
 
-from derain import InputError
+from derain.errors import InputError
 from derain.files import read_scan, write_scan
 
 COMPRESSIONS = ("uncompressed", "lz4", "zstd")
@@ -70,14 +70,8 @@ def test_columns_that_were_changed_are_written_and_others_kept(
     assert copy.drop(["x", "new"]).equals(table.drop(["x"]))
 
 
-def test_what_is_no_feather_of_points_is_refused(tmp_path: Path, table: pyarrow.Table) -> None:
+def test_version_1_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "scan.feather"
-    feather.write_feather(table, str(path))
-    content = path.read_bytes()
-    for damaged in (b"", b"FEA1" + content, content[:500], b"ARROW1\0\0" + content[500:]):
-        path.write_bytes(damaged)
-        with pytest.raises(InputError, match=r"cannot be read as \.feather"):
-            read_scan(path)
-    feather.write_feather(table.drop(["z"]), str(path))
-    with pytest.raises(InputError, match="has no x, y and z among its columns"):
+    path.write_bytes(b"FEA1" + bytes(100))
+    with pytest.raises(InputError, match="version 2"):
         read_scan(path)

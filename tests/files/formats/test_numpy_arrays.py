@@ -58,7 +58,6 @@ def test_organised_arrays_are_flattened_row_by_row_and_come_back_as_they_were(
     "row",
     [
         [("x", "f4"), ("y", "f4"), ("z", "f4"), ("i", "u2"), ("normal", "f4", (3,))],
-        [("x", "f4"), ("y", "f4"), ("z", "f4"), ("i", "f4")],
         [("xyz", "f4", (3,)), ("i", "f4")],
     ],
 )
@@ -93,30 +92,15 @@ def test_pickles_are_never_executed(tmp_path: Path) -> None:
             read_scan(tmp_path / name)
 
 
-@pytest.mark.parametrize("suffix", [".npy", ".npz"])
-def test_truncated_files_are_refused(tmp_path: Path, scan: Scan, suffix: str) -> None:
-    path = tmp_path / f"scan{suffix}"
-    write_scan(path, scan)
-    content = path.read_bytes()
-    for size in (0, 1, 5, 20, len(content) // 2, len(content) - 1):
-        path.write_bytes(content[:size])
-        with pytest.raises(InputError, match=rf"cannot be read as \{suffix}"):
-            read_scan(path)
-
-
 @pytest.mark.parametrize(
     "arrays",
     [
         np.float64(3),
-        np.arange(4.0),
         np.zeros((2, 2, 2, 4)),
         np.zeros(3, [("a", "f4")]),
-        {"points": np.zeros((5, 3))},
         {"xyz": np.zeros((5, 2))},
         {"xyz": np.zeros((5, 3), "U1")},
-        {"x": np.zeros(5), "y": np.zeros(5)},
         {"x": np.zeros(5), "y": np.zeros(5), "z": np.zeros(4)},
-        {"xyz": np.zeros((2, 2, 2, 3))},
         {"xyz": np.zeros(3)},
     ],
 )

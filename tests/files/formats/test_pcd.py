@@ -148,8 +148,6 @@ def test_open3d_reads_what_is_written(
     [
         ("WIDTH 9\nHEIGHT 1\nPOINTS 2", None),
         ("WIDTH 1\nHEIGHT 2\nPOINTS 9", (2, 1)),
-        ("WIDTH 9\nHEIGHT 2\nPOINTS 2", None),
-        ("WIDTH 0\nHEIGHT 1\nPOINTS 0", None),
         ("WIDTH 1\nHEIGHT 1\nPOINTS 1", None),
     ],
 )
@@ -167,10 +165,7 @@ def test_a_wrong_number_of_points_is_overruled_by_the_data(
     ("encoding", "data"),
     [
         *(("binary", data) for data in (DATA[:-1], DATA + b"garba" * 3)),
-        *(
-            ("ascii", b"1 2 3 4\n" + line)
-            for line in (b"", b"1 2 3", b"1 2 three 4", b"1 2 3 65536", b"1 2 3 4 # 5")
-        ),
+        *(("ascii", b"1 2 3 4\n" + line) for line in (b"", b"1 2 3", b"1 2 3 65536")),
         ("binary_compressed", b""),
         ("binary_compressed", compress(column_by_column()[:-2])),
         ("binary_compressed", struct.pack("<II", 2, 28) + b"\0A"),
@@ -191,30 +186,15 @@ def test_data_that_do_not_match_the_header_are_refused(
     [
         ("DATA binary\n", ""),
         ("DATA binary", "DATA zipped"),
-        ("FIELDS x y z intensity\n", ""),
         ("FIELDS x y z intensity", "FIELDS x y z x"),
         ("FIELDS x y z intensity", "FIELDS _ _ _ _"),
-        ("SIZE 4 4 4 2\n", ""),
         ("SIZE 4", "SIZE four"),
         ("TYPE F F F U", "TYPE F F F F"),
-        ("TYPE F F F U\n", ""),
         ("COUNT 1 1 1 1", "COUNT 1 1 1 0"),
-        ("COUNT 1 1 1 1", "COUNT 1 1 1"),
-        ("WIDTH 2", "WIDTH"),
         ("WIDTH 2", "WIDTH 2.5"),
     ],
 )
 def test_headers_that_make_no_sense_are_refused(file: Path, old: str, new: str) -> None:
     assert old in HEADER
-    with pytest.raises(InputError, match=r"read as \.pcd \(the header (says|has no) "):
+    with pytest.raises(InputError, match=r"read as \.pcd \(the header (states|has no) "):
         read_scan(write(file, HEADER.replace(old, new), DATA))
-
-
-def test_truth_values_and_foreign_byte_orders_are_written_as_pcd_spells_them(
-    file: Path, scan: Scan
-) -> None:
-    fields = {**scan.fields, "wet": np.arange(5) > 2, "far": np.arange(5, dtype=">i8")}
-    write_scan(file, replace(scan, fields=fields))
-    copy = read_scan(file)
-    np.testing.assert_array_equal(copy.fields["wet"], np.uint8([0, 0, 0, 1, 1]), strict=True)
-    np.testing.assert_array_equal(copy.fields["far"], np.arange(5, dtype="<i8"), strict=True)

@@ -54,15 +54,12 @@ def binary(order: str) -> bytes:
     return b"".join(struct.pack(f"{order}ffdB", *vertex) for vertex in vertices) + faces
 
 
-def test_text_is_read(file: Path) -> None:
-    check_points(read_scan(write(file, HEADER, DATA)))
-    check_points(read_scan(write(file, HEADER.replace("\n", "\r\n"), DATA)))
-
-
-@pytest.mark.parametrize("encoding", ["binary_little_endian", "binary_big_endian"])
-def test_both_byte_orders_are_read(file: Path, encoding: str) -> None:
-    data = binary(BYTE_ORDERS[encoding])
-    check_points(read_scan(write(file, HEADER.replace("ascii", encoding), data)))
+@pytest.mark.parametrize("encoding", BYTE_ORDERS)
+def test_every_encoding_is_read(file: Path, encoding: str) -> None:
+    header = HEADER.replace("ascii", encoding)
+    data = DATA if encoding == "ascii" else binary(BYTE_ORDERS[encoding])
+    check_points(read_scan(write(file, header, data)))
+    check_points(read_scan(write(file, header.replace("\n", "\r\n"), data)))
 
 
 def test_elements_before_the_vertices_are_passed_over(file: Path) -> None:
@@ -76,11 +73,9 @@ def test_elements_before_the_vertices_are_passed_over(file: Path) -> None:
 def test_a_cleaned_cloud_keeps_its_comments(file: Path) -> None:
     scan = read_scan(write(file, HEADER, DATA))
     write_scan(file, scan.take(np.array([True, False])))
-    assert (
-        "comment made by händ\n".encode() + b"obj_info two points\nelement vertex 1\n"
-        in file.read_bytes()
-    )
-    assert read_scan(file).xyz.tolist() == [[1.5, -2.0, np.float32(0.1)]]
+    assert file.read_text("utf-8").splitlines()[2:5] == [
+        "comment made by händ", "obj_info two points", "element vertex 1"
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("encoding", BYTE_ORDERS)
@@ -100,18 +95,13 @@ def test_open3d_reads_what_is_written(file: Path, scan: Scan, encoding: str, ope
         (HEADER, b""),
         (HEADER, b"1 2 3 4\n5 6 7\n"),
         (HEADER, b"1 2 3 4\n5 6 7 256\n"),
-        (HEADER, b"1 2 3 4\n5 6 seven 8\n"),
         (HEADER.replace("ascii", "binary_little_endian"), binary("<")[:33]),
         (HEADER.replace("vertex 2", "vertex 99999999999999999999"), DATA),
-        (HEADER.replace("vertex 2", "vertex -2"), DATA),
         (HEADER.replace("vertex 2", "points 2"), DATA),
         ("ply\nformat ascii 1.0\nelement vertex 2\nend_header\n", DATA),
-        ("ply\nformat binary_big_endian 1.0\nelement vertex 2\nend_header\n", DATA),
         (HEADER.replace("format ascii 1.0\n", ""), DATA),
         (HEADER.replace("format ascii 1.0", "format ascii 2.0"), DATA),
         (HEADER.replace("uchar intensity", "complex intensity"), DATA),
-        (HEADER.replace("float32 y", "float32 x"), DATA),
-        (HEADER.replace("element vertex 2\n", ""), DATA),
         (HEADER.replace("end_header\n", ""), DATA),
         (HEADER.replace("uchar intensity", "list uchar int echoes"), DATA),
         (HEADER.replace("ply", "obj"), DATA),
@@ -127,20 +117,23 @@ TRIANGLES = [(0, 1, 2), (2, 3, 4), (5, 4, 3), (1, 3, 5)]
 
 
 def mesh(faces: list[tuple[int, ...]], encoding: str, behind: str = "") -> bytes:
-    """A file of POINTS and of faces, each with a quality before and a colour behind its list."""
+    """A file of POINTS and of faces, each with a quality and a colour behind its list."""
     lines = [
         *("ply", f"format {encoding} 1.0", "element vertex 6"),
         *(f"property float {axis}" for axis in "xyz"),
-        *(f"element face {len(faces)}", "property float quality"),
-        *("property list uchar int vertex_indices", "property uchar red", behind, "end_header"),
+        *(f"element face {len(faces)}", "property list uchar int vertex_indices"),
+        *("property float quality", "property uchar red", behind, "end_header"),
     ]
     header = "".join(f"{line}\n" for line in lines if line).encode()
-    rows = [(0.5 * place, len(face), *face, place) for place, face in enumerate(faces)]
+    rows = [(len(face), *face, 0.5 * place, place) for place, face in enumerate(faces)]
     if encoding == "ascii":
-        text = [*POINTS.astype(int).tolist(), *([f"{row[0]:g}", *row[1:]] for row in rows)]
+        text = [
+            *POINTS.astype(int).tolist(),
+            *([*row[:-2], f"{row[-2]:g}", row[-1]] for row in rows),
+        ]
         return header + "".join(" ".join(map(str, line)) + "\n" for line in text).encode()
     order = BYTE_ORDERS[encoding]
-    data = [struct.pack(f"{order}fB{len(row) - 3}iB", *row) for row in rows]
+    data = [struct.pack(f"{order}B{len(row) - 3}ifB", *row) for row in rows]
     return header + POINTS.astype(f"{order}f4").tobytes() + b"".join(data)
 
 
@@ -157,6 +150,11 @@ def test_a_mesh_that_loses_nothing_comes_back_byte_for_byte(tmp_path: Path, enco
     assert left_out(path) == ()
     write_scan(tmp_path / "copy.ply", read_scan(path))
     assert (tmp_path / "copy.ply").read_bytes() == path.read_bytes()
+    more = mesh(TRIANGLES, encoding, "element edge 1\nproperty uchar vertex1")
+    path.write_bytes(more + (b"3\n" if encoding == "ascii" else b"3"))
+    assert left_out(path) == ("edge",)
+    write_scan(path, read_scan(path))
+    assert path.read_bytes() == mesh(TRIANGLES, encoding)
 
 
 @pytest.mark.parametrize("encoding", BYTE_ORDERS)
@@ -184,7 +182,7 @@ def test_faces_follow_vertices_in_any_order_and_the_first_of_those_taken_twice(
     path.write_bytes(mesh(TRIANGLES, "ascii"))
     scan = read_scan(path)
     for rows, lines in (
-        ([5, 3, 1], ["1.5 3 2 1 0 3"]),
+        ([5, 3, 1], ["3 2 1 0 1.5 3"]),
         ([*range(6), *range(6)[::-1]], mesh(TRIANGLES, "ascii").decode().splitlines()[-4:]),
     ):
         write_scan(path, scan.take(np.array(rows)))
@@ -195,7 +193,6 @@ def test_faces_follow_vertices_in_any_order_and_the_first_of_those_taken_twice(
 @pytest.mark.parametrize(
     ("faces", "cut"),
     [([*TRIANGLES, (0, 1, 2, 3)], 0), ([(0, 1, 6)], 0), ([(0, 1, -1)], 0), (TRIANGLES, 12)],
-    ids=["mixed", "far", "minus", "cut off"],
 )
 def test_faces_that_cannot_follow_are_left_out_and_said_to_be(
     tmp_path: Path, encoding: str, faces: list[tuple[int, ...]], cut: int
@@ -207,11 +204,5 @@ def test_faces_that_cannot_follow_are_left_out_and_said_to_be(
     write_scan(path, read_scan(path))
     assert b"face" not in path.read_bytes()
     np.testing.assert_array_equal(read_scan(path).xyz, POINTS)
-
-
-def test_other_elements_are_said_to_be_left_out(tmp_path: Path) -> None:
-    path = tmp_path / "mesh.ply"
-    path.write_bytes(mesh(TRIANGLES, "ascii", "element edge 1\nproperty int vertex1") + b"3\n")
-    assert left_out(path) == ("edge",)
-    write_scan(path, read_scan(path))
-    assert path.read_bytes() == mesh(TRIANGLES, "ascii")
+    path.write_bytes(mesh(TRIANGLES, encoding).replace(b"uchar int vertex", b"uchar float vertex"))
+    assert left_out(path) == ("face",)
