@@ -78,31 +78,6 @@ def test_every_method_and_baseline_stands_in_one_table(
     assert all(f"| {name} " in outcome.out for name in rows)
 
 
-def test_intensities_of_another_unit_are_warned_of_and_scaled(
-    run_derain, root: Path, tmp_path: Path, onnx_model: Path
-) -> None:
-    methods = ["--methods", f"net={onnx_model}", "ssr", "intensity", "dror"]
-    arguments = ["bench", "--data", root, *methods, *ONCE, "--out"]
-    assert run_derain(*arguments, tmp_path / "whole").said == []
-    for path in root.rglob("*.bin"):
-        points = np.fromfile(path, np.float32).reshape(-1, 4)
-        (points / np.array([1, 1, 1, 256], np.float32)).tofile(path)
-    first = root / "sequences/002/lidar_radar_pcd/0.bin"
-    net, ssr, *more = run_derain(*arguments, tmp_path / "small").said
-    assert net.startswith(f"derain: warning: {first}: net: mean intensity 0.")
-    assert ssr.startswith(f"derain: warning: {first}: ssr: intensities of 0..1, but 0..255")
-    assert more == [
-        f"derain: warning: 2 more scans: {title}: intensity of a smaller unit"
-        for title in ("net", "ssr")
-    ]
-    assert run_derain(*arguments, tmp_path / "scaled", "--intensity-scale", "256").said == []
-    whole, small, scaled = (
-        [row["counts"] for row in read_report(tmp_path / name)["rows"]]
-        for name in ("whole", "small", "scaled")
-    )
-    assert scaled == whole != small
-
-
 def test_processes_score_what_one_does_and_warn_of_the_same(
     run_derain, root: Path, tmp_path: Path, onnx_model: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

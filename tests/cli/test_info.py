@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from derain.evaluation.hard_cases import hard_cases, scene
+from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
 from derain.files import read_scan, write_scan
 from derain.files.labels import write_labels
@@ -82,29 +82,6 @@ def test_the_text_says_the_same_line_by_line(succeed, scan: Path) -> None:
     assert "  points: 6" in lines
     assert "  range / m: min 1.0, median 2.0, max 5.0" in lines
     assert "  fields: x float32, y float32, z float32, intensity float32" in lines
-
-
-def test_an_organised_scan_without_intensity_says_so(facts_of, tmp_path: Path) -> None:
-    np.savez(tmp_path / "frame.npz", xyz=np.ones((4, 6, 3), np.float32))
-    facts = facts_of(tmp_path / "frame.npz")
-    assert (facts["points"], facts["organised"], facts["intensity"]) == (24, "4 x 6", "none")
-
-
-def test_columns_are_taken_as_stated(facts_of, tmp_path: Path) -> None:
-    np.ones((8, 5), np.float32).tofile(tmp_path / "wide.bin")
-    facts = facts_of(tmp_path / "wide.bin", "--columns", "x,y,z,intensity,ring")
-    assert facts["points"] == 8
-    assert list(facts["fields"]) == ["x", "y", "z", "intensity", "ring"]
-
-
-@pytest.mark.parametrize(("name", "scan"), [(name, scan) for name, scan in hard_cases(100)])
-def test_every_hard_case_is_described(
-    succeed, facts_of, tmp_path: Path, name: str, scan: Scan
-) -> None:
-    write_scan(tmp_path / "hard.npz", scan)
-    facts = facts_of(tmp_path / "hard.npz")
-    assert (facts["points"], facts["valid"]) == (len(scan), scan.valid.sum())
-    succeed("info", tmp_path / "hard.npz")
 
 
 def test_labels_are_counted_by_class(succeed, facts_of, tmp_path: Path) -> None:

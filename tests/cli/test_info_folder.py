@@ -129,13 +129,6 @@ def test_a_picture_shows_one_folder_alone(refused, data_set: Path, tmp_path: Pat
         assert "--picture: shows one folder's statistics" in line
 
 
-def test_files_and_folders_can_be_named_together(run_derain, data_set: Path) -> None:
-    scan = data_set / "sequences/000/lidar_radar_pcd/000000.bin"
-    first, second = run_derain("info", data_set, scan, "--json").out.splitlines()
-    assert json.loads(first)["scans"] == 6
-    assert json.loads(second)["file"] == str(scan)
-
-
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [

@@ -271,17 +271,3 @@ def test_a_reference_that_can_show_no_level_is_refused(
     assert f"{small}: its reach is 15" in outcome.err
     outcome = succeed(*arguments, small, "--error", "10", "14")
     assert "for the error alone" in outcome.err
-
-
-@pytest.mark.parametrize(
-    ("options", "reason"),
-    [
-        (("--warning", "40", "30"), "Give two numbers of metres, the second one greater"),
-        (("--error", "35", "38"), "does not lie below the warning"),
-    ],
-)
-def test_levels_that_cannot_be_are_refused_before_any_work(
-    refused, recording: Path, tmp_path: Path, options: tuple[str, ...], reason: str
-) -> None:
-    assert reason in refused("run", "dror", recording, "--out", tmp_path / "out", *options)
-    assert not (tmp_path / "out").exists()

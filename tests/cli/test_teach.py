@@ -165,15 +165,3 @@ def test_the_sensor_is_where_the_user_says(
     assert outcome.code == 2
     assert "has 1 lines for 6 scans" in outcome.err
     assert not (tmp_path / "no").exists()
-
-
-def test_recordings_that_number_their_scans_alike_are_told_apart(
-    succeed, drive: Path, tmp_path: Path
-) -> None:
-    second = tmp_path / "again/velodyne"
-    second.mkdir(parents=True)
-    for number in range(3):
-        scene(POINTS, number).tofile(second / f"{number:06d}.bin")
-    succeed("teach", "between", drive, second, "--out", tmp_path / "out")
-    keys = {scan.key for scan in Manifest.read(tmp_path / "out").scans}
-    assert {"drive/velodyne/000001", "again/velodyne/000001"} <= keys

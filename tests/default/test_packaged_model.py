@@ -19,7 +19,7 @@ from derain.default import (
     packaged_model,
 )
 from derain.errors import InputError
-from derain.evaluation.hard_cases import hard_cases, scene
+from derain.evaluation.hard_cases import scene
 from derain.export.methods import load_method
 from derain.files.documents import LARGEST_DOCUMENT
 from derain.models.checkpoint import load_model
@@ -49,12 +49,6 @@ def test_the_file_is_that_of_the_card_and_small() -> None:
     assert card.name == DEFAULT
 
 
-def test_it_sees_isolated_points_and_no_unit_of_intensity() -> None:
-    spec = derain.Derainer(threads=1).spec
-    assert spec.view["kind"] == "isolated_points"
-    assert "intensity" not in spec.channels
-
-
 def test_without_a_name_it_is_the_model_and_judges_as_its_file_does() -> None:
     own, by_path = derain.Derainer(threads=1), derain.Derainer(default_model(), threads=1)
     by_name = load_method(DEFAULT, {}, 1)
@@ -65,13 +59,6 @@ def test_without_a_name_it_is_the_model_and_judges_as_its_file_does() -> None:
         own.as_dict() == by_name.as_dict() == {"method": DEFAULT, "threshold": own.spec.threshold}
     )
     assert by_path.as_dict()["method"] == str(default_model())
-
-
-@pytest.mark.parametrize(("name", "scan"), list(hard_cases(2000)))
-def test_it_survives_hard_cases(name: str, scan: Scan) -> None:
-    judgement = derain.Derainer(threads=1).judge(scan)
-    assert np.isfinite(judgement.probability).all()
-    assert not judgement.rain[~scan.valid].any()
 
 
 @pytest.mark.parametrize("change", [b"", b"more", None])

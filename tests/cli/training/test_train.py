@@ -101,31 +101,6 @@ def test_a_model_without_training_is_not_measured(last_line, wads: list[str]) ->
     assert "Give a checkpoint: --ckpt_path." in last_line("test", *wads)
 
 
-def test_labels_that_cannot_be_used_are_named_with_the_remedy(
-    last_line, wads: list[str], checkpoint: Path, tmp_path: Path
-) -> None:
-    label = tmp_path / "WADS/sequences/02/labels/0.label"
-    np.full(300, 77, "<u4").tofile(label)
-    options = ["--ckpt_path", checkpoint, "--data.loading.workers", "1"]
-    line = last_line("test", *wads, *options)
-    assert str(label) in line
-    assert "ids [77] are no classes of WADS. Name them in the data card." in line
-
-
-@pytest.mark.parametrize(
-    ("options", "reason"),
-    [
-        (["outdet_wads.yaml", "--data.root", "none"], "no such folder, though the split names"),
-        (["outdet_simulated.yaml", "--data.campaign.scans", "0"], "scans: 0 is too few. Give 1"),
-    ],
-)
-def test_data_that_cannot_be_used_is_named_with_the_remedy(
-    last_line, options: list[str], reason: str
-) -> None:
-    quiet = ["--trainer.enable_progress_bar", "false", "--data.loading.workers", "0"]
-    assert reason in last_line("fit", "--config", *options, *quiet)
-
-
 def test_intensities_of_another_unit_are_warned_of_and_scaled(
     succeed, wads: list[str], checkpoint: Path, tmp_path: Path
 ) -> None:
