@@ -29,7 +29,7 @@ from derain.datamodules.simulated import Simulated
 from derain.datamodules.taught import Taught
 from derain.datamodules.wads import Wads
 from derain.datamodules.worlds import Worlds
-from derain.default.model_card import LARGEST_SEED
+from derain.default import LARGEST_SEED
 from derain.errors import InputError, reason_of
 from derain.files.documents import Entry
 from derain.models.base import DerainingModule

@@ -7,8 +7,8 @@ import lightning
 import pytest
 import torch
 
+from derain import default
 from derain.cards.card import load_card
-from derain.default import packaged_model
 from derain.errors import InputError
 from derain.learning.start import STARTED_FROM
 from derain.models.checkpoint import load_model, save_model
@@ -46,7 +46,7 @@ def test_an_onnx_file_stands_for_the_checkpoint_beside_it(
 def test_default_is_the_checkpoint_that_derain_comes_with(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(packaged_model, "_folder", lambda: tmp_path)
+    monkeypatch.setattr(default, "FOLDER", tmp_path)
     with pytest.raises(InputError, match=r"comes with derain is missing\. Install derain again"):
         checkpoint_of("default")
     trained(tmp_path / "model.ckpt")

@@ -11,12 +11,12 @@ import torch
 import yaml
 
 import derain
+from derain import default
 from derain.default import (
     DEFAULT,
     default_checkpoint,
     default_model,
     model_card,
-    packaged_model,
 )
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
@@ -37,7 +37,7 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder.mkdir()
     for name in ("model.onnx", "model.ckpt", "card.yaml"):
         shutil.copy(Path(str(resources.files("derain.default"))) / name, folder)
-    monkeypatch.setattr(packaged_model, "_folder", lambda: folder)
+    monkeypatch.setattr(default, "FOLDER", folder)
     return folder
 
 

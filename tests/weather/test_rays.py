@@ -13,8 +13,17 @@ from derain.files import read_scan
 from derain.files.labels import read_labels
 from derain.scan import Scan
 from derain.views.returns import pair_returns
-from derain.weather.alike import FEWEST_SAMPLED, MULTIPLIER, ONE_IN, repetitions, seem_distinct
-from derain.weather.rays import BIN, RANGE_BINS, RAY_SECTORS, ray_ends
+from derain.weather.rays import (
+    BIN,
+    FEWEST_SAMPLED,
+    MULTIPLIER,
+    ONE_IN,
+    RANGE_BINS,
+    RAY_SECTORS,
+    ray_ends,
+    repetitions,
+    seem_distinct,
+)
 
 # A return: number of its ray, range in metres, and whether it is rain.
 Return = tuple[int, float, bool]
