@@ -81,8 +81,8 @@ def train(arguments: list[str]) -> None:
         InputError: As for :func:`derain.workflows.training.run_trainer`.
     """
     from derain.cli.outputs import print_lines
+    from derain.workflows.progress import EpochLines
     from derain.workflows.training import run_trainer
-    from derain.workflows.training_progress import EpochLines
 
     words = ["--help" if argument == ALL else argument for argument in arguments]
     trainer = run_trainer(words, EXAMPLES, {"callbacks": [EpochLines()]}).trainer

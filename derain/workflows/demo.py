@@ -37,7 +37,7 @@ from derain.system.stopwatch import Stopwatch
 from derain.views.scan_issues import ScanIssue
 from derain.workflows.fit import fit
 from derain.workflows.learn import export_checkpoint
-from derain.workflows.steps import Show, Steps, show_nothing
+from derain.workflows.progress import Show, Steps, show_nothing
 from derain.workflows.tuning import tune_filter_on, write_parameters
 
 # Titles of the networks, and the beginning of their configurations' names.

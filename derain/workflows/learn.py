@@ -29,7 +29,7 @@ from derain.workflows.fit import fit, fit_options
 from derain.workflows.learn_config import LearnConfig, Student, student_of
 from derain.workflows.learn_report import LEAST_RAIN, LearnResults, write_report
 from derain.workflows.odometry import find_poses, placed
-from derain.workflows.steps import Show, Steps, show_nothing
+from derain.workflows.progress import Show, Steps, show_nothing
 from derain.workflows.teaching import teach_recordings
 
 # A folder with this file may be cleared by a second run.

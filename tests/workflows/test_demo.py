@@ -20,7 +20,7 @@ from derain.scan import Scan
 from derain.simulation.campaign import Campaign
 from derain.system.open3d_import import import_open3d
 from derain.workflows.demo import DemoConfig, clean_given_scans, run_demo
-from derain.workflows.steps import Steps
+from derain.workflows.progress import Steps
 
 
 @pytest.fixture
