@@ -4,7 +4,7 @@ import shlex
 
 from derain.workflows.configurations import packaged_configs
 
-# What `--help` becomes where all options are asked for.
+# What `--help` becomes where all options are to be listed.
 ALL = "--help-all"
 
 EXAMPLES = {

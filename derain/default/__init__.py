@@ -29,7 +29,7 @@ class ModelScore:
     """How a model does on some data.
 
     Attributes:
-        data: Name of the data, which says so where their rain is simulated.
+        data: Name of the data, with a word where their rain is simulated.
         precision: Share of rain among what it takes; None where it was not measured, or where
             nothing is rain.
         recall: Share of the rain that it takes; None as before.

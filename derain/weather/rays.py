@@ -61,9 +61,9 @@ def ray_ends(scan: Scan, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
         else, and those that end at rain.
     """
     xyz = scan.xyz
-    asked = scan.valid if scan.radar is None else scan.valid & ~scan.radar
-    if not asked.all():
-        xyz, rain = xyz[asked], rain[asked]
+    of_rays = scan.valid if scan.radar is None else scan.valid & ~scan.radar
+    if not of_rays.all():
+        xyz, rain = xyz[of_rays], rain[of_rays]
     x, y, z = np.ascontiguousarray(xyz.T)
     reach = np.sqrt(x * x + y * y + z * z)  # which need not be as exact as Scan.range
     azimuth = _azimuth_cells(x, y)
@@ -141,10 +141,11 @@ def _counted(ends: NDArray[np.int32]) -> NDArray[np.int64]:
 def repetitions(numbers: NDArray[np.uint32]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Finds the numbers that repeat another one.
 
-    Every place is written into the slot of a table that the hash of its number names, the later
-    ones over the earlier ones. Whoever finds another place there repeats its number, or else only
-    shares a slot with it: then so do all that equal it, and they are asked again among themselves,
-    with another hash. Few are, while a sort, which takes five times as long, moves all.
+    The hash of each number names a slot of a table, into which the place of the number is written,
+    over that of any earlier number. A number whose slot holds another place repeats the number at
+    that place, or only shares the slot with it. Numbers that only share a slot, and all that equal
+    them, go into another round with another hash. They are few, while a sort, which takes five
+    times as long, moves all numbers.
 
     Args:
         numbers: uint32 (N,).
@@ -154,21 +155,19 @@ def repetitions(numbers: NDArray[np.uint32]) -> tuple[NDArray[np.intp], NDArray[
         None of these is in the first, so that leaving the first out leaves each number once.
     """
     table = np.empty(1 << max(2 * len(numbers), 2).bit_length(), np.int32)
-    multiplier, asked = MULTIPLIER, numbers
+    multiplier, pending = MULTIPLIER, numbers
     places = np.arange(len(numbers), dtype=np.int32)
-    pairs = [(places[:0], places[:0])]
-    while len(asked):
-        found = _last_in_slot(asked, places, multiplier, table)
-        equal = numbers.take(found) == asked
+    repeating, repeated = [places[:0]], [places[:0]]
+    while len(pending):
+        found = _last_in_slot(pending, places, multiplier, table)
+        equal = numbers.take(found) == pending
         # take is several times faster than indexing by truth values that follow no pattern.
-        repeats, strangers = np.flatnonzero(equal & (found != places)), np.flatnonzero(~equal)
-        pairs.append((places.take(repeats), found.take(repeats)))
-        places, asked = places.take(strangers), asked.take(strangers)
+        repeats, sharing = np.flatnonzero(equal & (found != places)), np.flatnonzero(~equal)
+        repeating.append(places.take(repeats))
+        repeated.append(found.take(repeats))
+        places, pending = places.take(sharing), pending.take(sharing)
         multiplier = multiplier * NEXT_MULTIPLIER % 2**32
-    repeating, repeated = (
-        np.concatenate(parts, dtype=np.intp) for parts in zip(*pairs, strict=True)
-    )
-    return repeating, repeated
+    return np.concatenate(repeating, dtype=np.intp), np.concatenate(repeated, dtype=np.intp)
 
 
 def seem_distinct(numbers: NDArray[np.uint32]) -> bool:

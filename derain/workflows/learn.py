@@ -26,7 +26,7 @@ from derain.system.memory import keep_freed_memory
 from derain.system.notices import recorded_warnings, warn
 from derain.workflows.evaluation import beside_persistence, evaluate_student, teacher_answers
 from derain.workflows.fit import fit, fit_options
-from derain.workflows.learn_config import LearnConfig, Student, student_of
+from derain.workflows.learn_config import PERSISTENCE, LearnConfig, Student, student_of
 from derain.workflows.learn_report import LEAST_RAIN, LearnResults, write_report
 from derain.workflows.odometry import find_poses, placed
 from derain.workflows.progress import Show, Steps, show_nothing
@@ -63,7 +63,13 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
             else; nothing to be learnt; or what a step raises. No model is left then.
     """
     source = named_frames(config.recordings, config.columns)
-    _refuse_too_few(config, source)
+    if len(source) < FEWEST_SCANS:
+        scans = "1 scan" if len(source) == 1 else f"{len(source)} scans"
+        raise InputError(
+            config.recordings[0],
+            f"{scans}: too few to learn from some and choose by others",
+            f"Record {FEWEST_SCANS} or more, one right after the other; twenty are enough.",
+        )
     student = student_of(config, source)
     require_writable(config.out)
     _clear(config.work)
@@ -79,6 +85,8 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
         recording = placed(found, poses)
         _teach(config, teacher, recording, steps, warnings)
         data = Taught(str(config.taught))
+        # Scans suit persistence, another teacher, where this one sees several at a time.
+        is_compared = config.teacher != PERSISTENCE and not teacher.window.is_one_scan
         results = LearnResults(
             title=", ".join(map(str, config.recordings)),
             teacher=config.teacher,
@@ -86,9 +94,7 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
             model=config.out,
             path=config.work / "report.md",
             scans=teacher_answers(data),
-            persistence=beside_persistence(data, recording)
-            if config.is_compared(teacher)
-            else None,
+            persistence=beside_persistence(data, recording) if is_compared else None,
             stood=config.poses == STANDING,
             sees_intensity=student.sees_unit,
             warnings=warnings,
@@ -143,17 +149,6 @@ def _settings(config: LearnConfig, student: Student) -> dict[str, object]:
         "checkpoint.filename": config.checkpoint.stem,
         "trainer.max_epochs": student.epochs,
     }
-
-
-def _refuse_too_few(config: LearnConfig, source: Source) -> None:
-    """Refuses a recording in which nothing can be held out."""
-    if len(source) < FEWEST_SCANS:
-        scans = "1 scan" if len(source) == 1 else f"{len(source)} scans"
-        raise InputError(
-            config.recordings[0],
-            f"{scans}: too few to learn from some and choose by others",
-            f"Record {FEWEST_SCANS} or more, one right after the other; twenty are enough.",
-        )
 
 
 def _clear(work: Path) -> None:

@@ -36,7 +36,7 @@ OF_OTHER_PROGRAMS = {
 
 HINT = "All options: --help-all."
 
-# What only says that something below it went wrong, or where.
+# Lines that only lead to the fault below them.
 _HEADINGS = ("Parser key", "Does not validate", "Subtypes:", "Errors:", "Problem with", "Given ")
 
 

@@ -100,26 +100,15 @@ def test_a_model_says_its_spec_proof_and_versions(succeed, facts_of, onnx_model:
         assert fact in text
 
 
-@pytest.mark.parametrize(
-    ("training", "line"),
-    [
-        ({"sequences": [f"{n:04}" for n in range(2000)]}, "    training: sequences 2,000"),
-        ({}, "    training: "),
-    ],
-)
 def test_scans_of_a_training_are_counted_in_the_text_and_named_in_json(
-    succeed,
-    facts_of,
-    random_outdet: OutDet,
-    tmp_path: Path,
-    training: dict[str, list[str]],
-    line: str,
+    succeed, facts_of, random_outdet: OutDet, tmp_path: Path
 ) -> None:
     model, path = deepcopy(random_outdet), tmp_path / "model.ckpt"
+    training = {"sequences": [f"{n:04}" for n in range(2000)]}
     model.adopt(replace(model.spec, training=training))
     save_model(model, path)
     lines = succeed("info", path).out.splitlines()
-    assert line in lines
+    assert "    training: sequences 2,000" in lines
     assert "  parameters: 11019" in lines
     facts = facts_of(path)
     assert facts["spec"] == model.spec.as_dict()
@@ -172,12 +161,6 @@ def test_what_a_second_return_gives_back_is_told_where_labels_and_card_say_what_
     assert found["share given back"] == 1
     (tmp_path / "dual.label").unlink()
     assert "share given back" not in facts_of(*arguments)["returns"]
-
-
-def test_labels_of_another_scan_are_refused(refused, tmp_path: Path, recording: Recording) -> None:
-    write_labels(tmp_path / "dual.label", np.zeros(3, np.int64))
-    line = refused("info", tmp_path / "dual.npz", "--card", "wads")
-    assert "holds 3 labels of 4 bytes for a scan of" in line
 
 
 def test_a_scan_without_a_valid_point_has_no_grid(facts_of, refused, tmp_path: Path) -> None:

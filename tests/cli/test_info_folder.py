@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from derain.cards.card import load_card
 from derain.evaluation.hard_cases import scene
@@ -92,35 +91,12 @@ def test_the_layout_tells_the_card_unless_it_is_stated(facts_of, data_set: Path)
     assert (facts["points"], facts["labelled_points"]) == (600, 0)
 
 
-@pytest.mark.parametrize("part", ["sequences", "sequences/000", "sequences/000/lidar_radar_pcd"])
-def test_a_part_of_a_simulated_set_is_known_as_simulated(
-    facts_of, data_set: Path, part: str
-) -> None:
-    facts = facts_of(data_set / part)
-    assert facts["card"] == "simulated rain"
-    assert some(facts["by_rain_rate"]["25"]["points_by_class"]) == {"rain": 20, "road": 180}
-
-
 def test_scans_without_labels_and_card_are_counted(succeed, facts_of, tmp_path: Path) -> None:
     scene(100).tofile(tmp_path / "0.bin")
     facts = facts_of(tmp_path)
     assert (facts["scans"], facts["points"], facts["class_share"]) == (1, 100, {})
     assert (facts["layout"], facts["card"]) == (None, None)
     assert "no data card" in succeed("info", tmp_path).out
-
-
-def test_the_statistics_are_drawn(
-    succeed, data_set: Path, tmp_path: Path, saved_figures: list[Figure]
-) -> None:
-    succeed("info", data_set, "--picture", tmp_path / "statistics.png")
-    (figure,) = saved_figures
-    assert figure.get_suptitle() == "data: 6 scans, 600 points"
-    shares, points = figure.axes
-    assert [text.get_text() for text in shares.texts if text.get_text()] == [
-        *("clean: 33%", "25 mm/h: 33%", "rain unknown: 33%")
-    ]
-    bars = {bar.get_label(): bar.datavalues.tolist() for bar in points.containers}
-    assert bars == {"clean": [0, 200], "25 mm/h": [20, 180], "rain unknown": [20, 180]}
 
 
 def test_a_picture_shows_one_folder_alone(refused, data_set: Path, tmp_path: Path) -> None:

@@ -144,12 +144,6 @@ def test_columns_and_a_picture(succeed, tmp_path: Path, saved_figures: list[Figu
     assert figure.get_suptitle() == "scan in 50 mm/h of simulated rain, and without its drops"
 
 
-def test_clean_scans_are_not_overwritten(refused, clean: Path) -> None:
-    before = {path: path.read_bytes() for path in clean.iterdir()}
-    assert "would overwrite" in refused("simulate", "--on", clean, "--rain", "25", "--out", clean)
-    assert {path: path.read_bytes() for path in clean.iterdir()} == before
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

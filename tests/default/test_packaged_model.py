@@ -21,7 +21,6 @@ from derain.default import (
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.export.methods import load_method
-from derain.files.documents import LARGEST_DOCUMENT
 from derain.models.checkpoint import load_model
 from derain.scan import Scan
 from derain.views.probability import probability_of_rain
@@ -124,10 +123,3 @@ def test_a_damaged_card_is_refused(installed: Path, key: str, value: object, rea
     path.write_text(yaml.safe_dump({k: v for k, v in content.items() if v is not None}))
     with pytest.raises(InputError, match=f"{reason}.*Install derain again"):
         model_card()
-
-
-def test_what_is_no_card_is_refused(installed: Path) -> None:
-    for content in ("[]", "a: [", "x" * (LARGEST_DOCUMENT + 1)):
-        (installed / "card.yaml").write_text(content)
-        with pytest.raises(InputError, match=r"card\.yaml.*Install derain again"):
-            model_card()
