@@ -2,8 +2,7 @@
 
 import shlex
 import shutil
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 
 from derain.annotation.manifest import FEWEST_SCANS
@@ -13,11 +12,10 @@ from derain.export.methods import load_method, named_method, over_recording
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.files.atomic import replacing, require_writable
-from derain.files.reading import reading
 from derain.models.checkpoint import load_model
 from derain.recordings.posed import ODOMETRY, STANDING
 from derain.sources.folders import named_frames
-from derain.sources.frame import Frame
+from derain.sources.judging import Failures, Guard
 from derain.sources.method import Method
 from derain.sources.recordings import recordings_of
 from derain.sources.records import POSES
@@ -169,6 +167,11 @@ def _clear(work: Path) -> None:
         temporary.write_text("Written by derain learn, which clears this folder.\n", "utf-8")
 
 
+def _warning_guard() -> Guard:
+    """Turns what is wrong with one scan into a warning; the others go on."""
+    return Failures(lambda error: warn(str(error))).skipping_failures
+
+
 def _poses_file(config: LearnConfig, source: Source) -> Path:
     return config.work / (POSES if len(recordings_of(source)) == 1 else "poses")
 
@@ -183,7 +186,7 @@ def _find_poses(config: LearnConfig, source: Source, steps: Steps) -> str | None
         return config.poses
     file = _poses_file(config, source)
     steps.begin(f"Odometry: poses of {len(source):,} scans")
-    recordings = find_poses(source, file, guard=_warning_of)
+    recordings = find_poses(source, file, guard=_warning_guard())
     faults = [found.fault for found in recordings if found.fault is not None]
     if len(faults) == len(recordings):
         raise faults[0]
@@ -202,7 +205,7 @@ def _teach(
         InputError: So few scans are labelled that none of them is held out.
     """
     steps.begin(f"Teaching: {config.teacher} labels the scans")
-    results = teach_recordings(teacher, recording, config.taught, guard=_warning_of)
+    results = teach_recordings(teacher, recording, config.taught, guard=_warning_guard())
     labelled = len(results.manifest.scans)
     if not results.held_out:
         reason = f": {warnings[0]}" if warnings else ""
@@ -213,16 +216,6 @@ def _teach(
             "Record scans that overlap.",
         )
     steps.end(f"{labelled:,} scans labelled")
-
-
-@contextmanager
-def _warning_of(frame: Frame) -> Iterator[None]:
-    """Turns what is wrong with one scan into a warning; the others go on."""
-    try:
-        with reading(Path(frame.name)):
-            yield
-    except InputError as error:
-        warn(str(error))
 
 
 def _refuse_clean(results: LearnResults) -> None:
