@@ -46,7 +46,7 @@ def test_scans_alone_are_cleaned_by_the_model_that_comes_with_derain(
     np.testing.assert_array_equal(judged(here / "cleaned"), expected)
 
 
-def test_with_json_it_says_so_beside_the_objects(succeed, here: Path) -> None:
+def test_with_json_it_is_named_beside_the_objects(succeed, here: Path) -> None:
     outcome = succeed("run", "scans", "--out", "cleaned", "--json")
     assert [json.loads(line)["points"] for line in outcome.out.splitlines()] == [200, 200]
     assert outcome.err.startswith(SAYS)
@@ -115,9 +115,7 @@ def test_scores_of_a_card_are_a_table() -> None:
     assert ["clean", "-", "-", "-", "0.050%"] in rows
 
 
-def test_a_folder_of_its_name_makes_it_unclear_what_is_asked(
-    run_derain, refused, here: Path
-) -> None:
+def test_a_folder_of_its_name_makes_the_name_ambiguous(run_derain, refused, here: Path) -> None:
     (here / "default").mkdir()
     line = refused("info", "default")
     assert "default: it is the model that comes with derain, and a file or folder here" in line

@@ -48,7 +48,7 @@ def scans(tmp_path: Path, write_labelled, monkeypatch: pytest.MonkeyPatch) -> Pa
 
 
 @pytest.mark.usefixtures("one_block")
-def test_candidates_are_fitted_to_labelled_scans_and_their_cost_is_said(
+def test_candidates_are_fitted_to_labelled_scans_and_their_cost_is_printed(
     succeed,
     checkpoint: Path,
     onnx_model: Path,

@@ -1,4 +1,4 @@
-"""``derain fuse``: folders of two sensors become one, frame by frame, as their clocks say."""
+"""``derain fuse``: folders of two sensors become one, frame by frame, by their clocks."""
 
 import csv
 from collections.abc import Callable
@@ -72,7 +72,7 @@ def test_each_scan_is_joined_by_the_radar_frame_nearest_in_time(run_fuse: Fuse) 
     assert not Path("out/lidar_radar_labels").exists()
 
 
-def test_the_metadata_say_what_was_joined_to_what(run_fuse: Fuse) -> None:
+def test_the_metadata_name_what_was_joined_to_what(run_fuse: Fuse) -> None:
     for sensor in ("lidar", "radar"):
         path = Path(sensor, "metadata.csv")
         path.write_text(path.read_text().replace("frame,timestamp", "stem,seconds"))
@@ -84,7 +84,7 @@ def test_the_metadata_say_what_was_joined_to_what(run_fuse: Fuse) -> None:
 
 
 @pytest.mark.parametrize("reach", [0.01, 1000])
-def test_labels_reach_as_far_as_is_said_and_instances_are_kept(
+def test_labels_reach_as_far_as_an_option_allows_and_instances_are_kept(
     run_fuse: Fuse, reach: float
 ) -> None:
     assert run_fuse("--labels", "labels", "--label-within", str(reach)).code == 0

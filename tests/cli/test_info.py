@@ -1,4 +1,4 @@
-"""``derain info`` says what is in a scan, labels, a model and a checkpoint."""
+"""``derain info`` prints what is in a scan, labels, a model and a checkpoint."""
 
 import json
 from copy import deepcopy
@@ -75,7 +75,7 @@ def test_a_scan_is_described_by_its_valid_points(facts_of, scan: Path) -> None:
     }
 
 
-def test_the_text_says_the_same_line_by_line(succeed, scan: Path) -> None:
+def test_the_text_holds_the_same_line_by_line(succeed, scan: Path) -> None:
     outcome = succeed("info", scan)
     lines = outcome.out.splitlines()
     assert lines[0] == str(scan)
@@ -93,7 +93,7 @@ def test_labels_are_counted_by_class(succeed, facts_of, tmp_path: Path) -> None:
     assert "  points by class id: 0 1, 40 1, 110 2" in succeed("info", path).out.splitlines()
 
 
-def test_a_model_says_its_spec_proof_and_versions(succeed, facts_of, onnx_model: Path) -> None:
+def test_a_model_holds_its_spec_proof_and_versions(succeed, facts_of, onnx_model: Path) -> None:
     assert facts_of(onnx_model) == {"file": str(onnx_model), **Derainer(onnx_model).metadata}
     text = succeed("info", onnx_model).out
     for fact in ("network: outdet", "data: WADS", "licence: CC BY-NC-SA 4.0", "flipped: 0"):
@@ -139,28 +139,28 @@ def recording(tmp_path: Path) -> Recording:
     return recording
 
 
-def test_rays_of_two_returns_are_counted(facts_of, tmp_path: Path, recording: Recording) -> None:
+def test_rays_of_two_returns_are_counted_and_by_labels_what_lies_behind_rain(
+    facts_of, tmp_path: Path, recording: Recording
+) -> None:
     _, nearer, _ = recording.truth()
     rays, dual = len(np.unique(recording.ray)), int(nearer.sum())
-    assert facts_of(tmp_path / "dual.npz")["returns"] == {
+    met = int((nearer & (recording.ray % 2 == 0)).sum())
+    counted = {
         "told by": "directions",
         "rays": rays,
         "with two returns": dual,
         "share": round(dual / rays, 4),
     }
-
-
-def test_what_a_second_return_gives_back_is_told_where_labels_and_card_say_what_rain_is(
-    facts_of, tmp_path: Path, recording: Recording
-) -> None:
-    _, nearer, _ = recording.truth()
-    met = int((nearer & (recording.ray % 2 == 0)).sum())
+    by_labels = {
+        "that met rain first": met,
+        "with something else behind": met,
+        "share given back": 1,
+    }
     arguments = [tmp_path / "dual.npz", "--card", "wads"]
-    found = facts_of(*arguments)["returns"]
-    assert found["that met rain first"] == found["with something else behind"] == met > 0
-    assert found["share given back"] == 1
+    assert facts_of(tmp_path / "dual.npz")["returns"] == counted
+    assert facts_of(*arguments)["returns"] == {**counted, **by_labels}
     (tmp_path / "dual.label").unlink()
-    assert "share given back" not in facts_of(*arguments)["returns"]
+    assert facts_of(*arguments)["returns"] == counted
 
 
 def test_a_scan_without_a_valid_point_has_no_grid(facts_of, refused, tmp_path: Path) -> None:

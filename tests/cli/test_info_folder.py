@@ -84,7 +84,7 @@ def test_the_card_names_the_classes(facts_of, data_set: Path, tmp_path: Path) ->
     assert list(facts["class_share"]) == ["wet", "grey"]
 
 
-def test_the_layout_tells_the_card_unless_it_is_stated(facts_of, data_set: Path) -> None:
+def test_the_layout_chooses_the_card_unless_it_is_stated(facts_of, data_set: Path) -> None:
     (data_set / "manifest.json").unlink()
     assert facts_of(data_set)["card"] == "REHEARSE-3D"
     facts = facts_of(data_set, "--layout", "lidar_radar_pcd,elsewhere")

@@ -56,7 +56,7 @@ def weights(model: Path) -> str:
 
 
 @pytest.mark.usefixtures("one_block")
-def test_a_recording_becomes_a_model_and_a_report_whatever_its_labels_say(
+def test_a_recording_becomes_a_model_and_a_report_whatever_its_labels(
     succeed, recording: Path
 ) -> None:
     lightning.seed_everything(0)

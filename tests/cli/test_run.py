@@ -106,15 +106,13 @@ def test_a_scan_for_which_the_memory_is_too_small_does_not_end_the_run(
         ["run", "ror", "{scans}", "--out", "out"],
         ["info", "{scans}"],
         ["view", "{scans}/000001.bin", "--methods", "ror", "--out", "out.png"],
-        ["annotate", "{scans}", "--scene", "scene.yaml", "--out", "out", "--no-picture"],
     ],
     ids=lambda command: command[0],
 )
-def test_damaged_records_break_no_command_that_asks_for_none(
+def test_damaged_records_break_no_command_that_needs_none(
     succeed, scans: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: list[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    Path("scene.yaml").write_text("road: [[2, -10], [60, -10], [60, 10], [2, 10]]")
     for record in ("poses.txt", "times.txt", "calib.txt", "scans/metadata.csv"):
         Path(record).write_bytes(b"\xff damaged")
     succeed(*(word.format(scans=scans) for word in command))
@@ -235,21 +233,6 @@ def test_columns_are_taken_as_stated_and_all_kept(
     assert (out / "scan.bin").read_bytes() == wide[~rain].tobytes()
 
 
-def test_an_organised_scan_is_labelled_cell_by_cell(
-    succeed, onnx_model: Path, tmp_path: Path
-) -> None:
-    points = scene(240)
-    points[::6] = np.nan  # cells without a return
-    source, out = tmp_path / "scan.pcd", tmp_path / "out"
-    write_scan(source, Scan(points[:, :3].copy(), points[:, 3].copy(), shape=(8, 30)))
-    succeed("run", onnx_model, source, "--out", out)
-    rain = rain_in(out)
-    np.testing.assert_array_equal(rain, Derainer(onnx_model)(points))
-    cleaned = read_scan(out / "scan.pcd")
-    np.testing.assert_array_equal(cleaned.xyz, points[~rain, :3])
-    assert cleaned.shape is None
-
-
 def write_named(path: Path) -> Scan:
     """A scan of 300 points with columns that have names; of LAS in whole millimetres."""
     points = scene(300)
@@ -303,7 +286,7 @@ def odd_scans(tmp_path: Path) -> Path:
     return folder
 
 
-def test_every_fault_is_told_with_its_first_file_and_counted(
+def test_every_fault_is_named_with_its_first_file_and_counted(
     succeed, odd_scans: Path, onnx_model: Path, tmp_path: Path
 ) -> None:
     outcome = succeed("run", onnx_model, odd_scans, "--out", tmp_path / "out", "--json")

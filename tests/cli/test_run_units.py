@@ -39,7 +39,9 @@ def test_a_run_of_more_scans_than_a_block_keeps_records_and_goes_on(
     assert table.read_text() == rows
 
 
-def test_a_run_of_few_scans_keeps_none_unless_asked(succeed, scans: Path, tmp_path: Path) -> None:
+def test_a_run_of_few_scans_keeps_none_without_an_option(
+    succeed, scans: Path, tmp_path: Path
+) -> None:
     out = tmp_path / "out"
     succeed("run", "dror", scans, "--out", out, "--most-removed", 1)
     assert not (out / ".derain").exists()

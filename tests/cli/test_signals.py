@@ -1,4 +1,4 @@
-"""A command that is asked to end clears up, and says by its exit code what ended it."""
+"""A signal ends a command, which clears up and whose exit code names the signal."""
 
 import signal
 import subprocess
@@ -45,7 +45,7 @@ def stopped(path: Path, by: signal.Signals) -> tuple[int, str]:
 
 
 @pytest.mark.parametrize("by", ENDING, ids=lambda by: by.name)
-def test_a_command_that_is_asked_to_end_leaves_nothing_half_written(
+def test_a_command_that_a_signal_ends_leaves_nothing_half_written(
     tmp_path: Path, by: signal.Signals
 ) -> None:
     path = tmp_path / "result.bin"

@@ -86,7 +86,7 @@ def test_shards_are_counted_by_the_status(
     assert json.loads(succeed("status", root, "--json").out)["done"] == 3
 
 
-def test_a_drive_goes_along_a_street_in_the_rain_asked_for_without_a_radar(
+def test_a_drive_goes_along_a_street_in_the_rain_of_its_options_without_a_radar(
     succeed, facts_of, tmp_path: Path
 ) -> None:
     root = tmp_path / "drive"
@@ -107,9 +107,7 @@ def rained(folder: Path, stem: str, columns: int = 4) -> tuple[NDArray[np.float3
     return points, read_labels(folder / f"{stem}.label", len(points))
 
 
-def test_clean_scans_get_rain_and_labels_that_say_which_it_is(
-    succeed, clean: Path, tmp_path: Path
-) -> None:
+def test_clean_scans_get_rain_and_labels_of_it(succeed, clean: Path, tmp_path: Path) -> None:
     out = tmp_path / "rainy"
     outcome = succeed("simulate", "--on", clean, "--rain", "50", "--out", out, "--json")
     assert names(out) == ["000005.bin", "000005.label", "000006.bin", "000006.label"]
@@ -125,7 +123,7 @@ def test_clean_scans_get_rain_and_labels_that_say_which_it_is(
         assert set(map(bytes, points[label == 0, :3])) <= set(map(bytes, before))
 
 
-def test_a_line_says_what_the_rain_did_to_a_scan(succeed, clean: Path, tmp_path: Path) -> None:
+def test_a_line_holds_what_the_rain_did_to_a_scan(succeed, clean: Path, tmp_path: Path) -> None:
     scan = clean / "000005.bin"
     outcome = succeed("simulate", "--on", scan, "--rain", "0", "--out", tmp_path / "rainy")
     assert outcome.out == f"{scan}: 5,000 points, in the rain 5,000: 0 of drops, 0 lost\n"

@@ -1,4 +1,4 @@
-"""What a user may start a training from, and what is said where that does not work."""
+"""What a training may start from, and what is refused."""
 
 import shutil
 from pathlib import Path
@@ -70,7 +70,7 @@ def test_fit_begins_with_the_weights_of_its_start(
     succeed("fit", *wads, *more, *last)
 
 
-def test_fit_tells_what_it_cannot_start_from(run_derain, tmp_path: Path, wads: list[str]) -> None:
+def test_fit_refuses_what_it_cannot_start_from(run_derain, tmp_path: Path, wads: list[str]) -> None:
     start = tmp_path / "start.ckpt"
     trained(start)
     options = [*wads, "--start", str(start)]

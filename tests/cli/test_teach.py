@@ -37,7 +37,7 @@ def drive(tmp_path: Path) -> Path:
     return folder
 
 
-def test_it_tells_of_every_scan_and_of_all(succeed, drive: Path, tmp_path: Path) -> None:
+def test_every_scan_is_printed_and_all_together(succeed, drive: Path, tmp_path: Path) -> None:
     out = tmp_path / "taught"
     outcome = succeed("teach", "between", drive, "--out", out, "--set", "rain_below=7")
     lines = outcome.out.splitlines()
@@ -78,7 +78,7 @@ def test_truth_is_measured_for_the_record_where_a_card_explains_it(
     assert len(Manifest.read(tmp_path / "out").scans) == 6
 
 
-def test_objects_are_printed_where_asked_for(run_derain, drive: Path, tmp_path: Path) -> None:
+def test_objects_are_printed_for_json(run_derain, drive: Path, tmp_path: Path) -> None:
     outcome = run_derain("teach", "dror", drive, "--out", tmp_path / "out", "--json")
     facts = [json.loads(line) for line in outcome.out.splitlines()]
     assert [Path(item["scan"]).stem for item in facts] == [f"{n:06d}" for n in range(6)]
@@ -103,7 +103,7 @@ def test_scans_that_cannot_be_read_are_passed_over(run_derain, drive: Path, tmp_
         (["--poses", "none.txt"], "none.txt"),
     ],
 )
-def test_what_is_wrong_is_told(
+def test_what_is_wrong_is_named(
     run_derain, drive: Path, tmp_path: Path, options: list[str], told: str
 ) -> None:
     outcome = run_derain("teach", "between", drive, "--out", tmp_path / "out", *options)
@@ -145,7 +145,7 @@ def test_points_that_are_not_known_stay(succeed, drive: Path, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("command", ["run", "teach"])
-def test_the_sensor_is_where_the_user_says(
+def test_the_sensor_is_where_the_option_places_it(
     run_derain, succeed, drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str
 ) -> None:
     made: list[Between] = []

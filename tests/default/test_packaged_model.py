@@ -85,7 +85,7 @@ def test_a_changed_file_is_refused(installed: Path, change: bytes | None) -> Non
         ("card.yaml", default_model),
     ],
 )
-def test_a_missing_file_is_told(installed: Path, name: str, find: Callable[[], object]) -> None:
+def test_a_missing_file_is_named(installed: Path, name: str, find: Callable[[], object]) -> None:
     (installed / name).unlink()
     with pytest.raises(InputError, match=r"model that comes with derain is missing\. Install"):
         find()

@@ -104,7 +104,7 @@ def test_what_cannot_be_judged_and_what_a_radar_saw_is_of_no_ray() -> None:
     assert np.argwhere(ends).tolist() == [[0, 0, 10]]
 
 
-def test_of_real_scans_as_many_rays_are_told_as_by_their_pairs_of_returns(shared: Path) -> None:
+def test_of_real_scans_as_many_rays_are_found_as_by_their_pairs_of_returns(shared: Path) -> None:
     # One of single returns, without its copies; one of two returns as the sensor wrote it.
     for scan_file, label_file in (
         ("clean/kitti_front.bin", None),
@@ -130,7 +130,7 @@ def test_each_number_is_left_once_and_the_others_repeat_it(values: list[int]) ->
     assert not set(repeating) & set(repeated)
 
 
-def test_numbers_of_one_slot_are_told_apart() -> None:
+def test_numbers_of_one_slot_are_kept_apart() -> None:
     # What the multiplier makes 0, 1, 2 and so on of, so that all upper bits are 0.
     inverse = pow(MULTIPLIER, -1, 2**32)
     numbers = np.array([place * inverse % 2**32 for place in range(2000)] * 2, np.uint32)
@@ -146,4 +146,4 @@ def test_a_sample_shows_whether_many_numbers_repeat_others() -> None:
     assert seem_distinct(many)
     again = generator.choice(many, len(many) // 100)
     assert not seem_distinct(np.concatenate([many, again]))
-    assert not seem_distinct(many[: FEWEST_SAMPLED * ONE_IN // 2])  # too few to say so
+    assert not seem_distinct(many[: FEWEST_SAMPLED * ONE_IN // 2])  # too few to know

@@ -9,7 +9,6 @@ import pytest
 import yaml
 from matplotlib.image import imread
 
-from derain.cli.main import main
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
@@ -104,13 +103,3 @@ def test_an_unreadable_scan_is_refused_before_the_first_step(
         assert (outcome.code, outcome.out) == (2, "")
         assert reason in outcome.err
     assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.usefixtures("small")
-def test_a_step_that_fails_ends_the_demonstration(capsys: pytest.CaptureFixture[str]) -> None:
-    Path("demo/simulated").mkdir(parents=True)
-    Path("demo/simulated/mine.txt").touch()
-    assert main(["demo"]) == 2
-    outcome = capsys.readouterr()
-    assert "Tuning" not in outcome.out
-    assert "demo/simulated: holds something other than" in outcome.err

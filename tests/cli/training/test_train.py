@@ -96,10 +96,6 @@ def test_no_training_goes_on_from_weights_alone(refused, wads: list[str], checkp
     assert not Path("runs").exists()
 
 
-def test_a_model_without_training_is_not_measured(last_line, wads: list[str]) -> None:
-    assert "Give a checkpoint: --ckpt_path." in last_line("test", *wads)
-
-
 def test_intensities_of_another_unit_are_warned_of_and_scaled(
     succeed, wads: list[str], checkpoint: Path, tmp_path: Path
 ) -> None:
@@ -114,14 +110,6 @@ def test_intensities_of_another_unit_are_warned_of_and_scaled(
     scaled = succeed(*predict, "scaled", "--data.loading.intensity_scale", "256")
     assert "derain: warning: " not in scaled.err
     assert Path("scaled/0.label").read_bytes() == Path("whole/0.label").read_bytes()
-
-
-def test_predictions_that_cannot_be_written_are_reported(
-    last_line, wads: list[str], checkpoint: Path
-) -> None:
-    Path("file").touch()
-    options = ["--ckpt_path", checkpoint, "--predictions.folder", "file/below"]
-    assert "file/below/0.label: cannot be written" in last_line("predict", *wads, *options)
 
 
 def test_training_goes_on_from_a_checkpoint_and_keeps_what_was_best_before(
@@ -179,7 +167,7 @@ def test_a_test_is_logged_into_the_folder_of_its_training(
     assert "Tip" not in caplog.text
 
 
-def test_a_test_is_logged_where_it_is_told_to_or_into_a_folder_of_its_own(
+def test_a_test_is_logged_where_an_option_names_or_into_a_folder_of_its_own(
     succeed, wads: list[str], checkpoint: Path
 ) -> None:
     of_a_run = Path("runs/mine/version_7/checkpoints/best.ckpt")
