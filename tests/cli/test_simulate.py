@@ -123,10 +123,17 @@ def test_clean_scans_get_rain_and_labels_of_it(succeed, clean: Path, tmp_path: P
         assert set(map(bytes, points[label == 0, :3])) <= set(map(bytes, before))
 
 
-def test_a_line_holds_what_the_rain_did_to_a_scan(succeed, clean: Path, tmp_path: Path) -> None:
-    scan = clean / "000005.bin"
-    outcome = succeed("simulate", "--on", scan, "--rain", "0", "--out", tmp_path / "rainy")
+def test_a_line_holds_what_the_rain_did_to_a_scan_and_a_bad_scan_is_reported(
+    run_derain, clean: Path, tmp_path: Path
+) -> None:
+    scan, bad = clean / "000005.bin", clean / "000004.bin"
+    bad.write_bytes(b"12345")
+    outcome = run_derain("simulate", "--on", bad, scan, "--rain", "0", "--out", tmp_path / "rainy")
+    assert outcome.code == 2
     assert outcome.out == f"{scan}: 5,000 points, in the rain 5,000: 0 of drops, 0 lost\n"
+    first, last = outcome.err.splitlines()
+    assert first.startswith(f"derain: {bad}: 5 bytes are not whole rows of 16 bytes")
+    assert "1 of 2 scans" in last
 
 
 def test_columns_and_a_picture(succeed, tmp_path: Path, saved_figures: list[Figure]) -> None:
