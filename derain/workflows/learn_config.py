@@ -145,27 +145,27 @@ def student_of(config: LearnConfig, source: Source) -> Student:
             folder to be cleared, that is of another network, or that sees intensity where the
             student is to be blind or the scans have none.
     """
-    blind = config.blind or source[0].read().intensity is None
+    sees_intensity = source[0].read().intensity is not None and not config.blind
     start = config.begins_with
     if start is None:
         network = config.model or STUDENTS[0]
-        file, settings = _configuration(network)
+        blind = not sees_intensity and network != CUES
         if network == CUES:
-            blind = False
             _refuse_blind(config.blind, f"{CUES} weighs intensity, as each scan shows it")
-        elif blind:
-            settings["model.channels"] = BLIND[network]
     else:
         spec = _spec_of_start(config, start)
-        if "intensity" in spec.channels and blind and not config.blind:
+        network, blind = spec.network, not spec.weighs_intensity
+        if "intensity" in spec.channels and not sees_intensity:
             raise InputError(
                 config.recordings[0],
                 f"has no intensities, which {start} sees",
                 "Give a start that is blind to intensity, or name a network by --model.",
             )
-        network, blind = spec.network, not spec.weighs_intensity
-        file, settings = _configuration(network)
+    file, settings = _configuration(network)
+    if start is not None:
         settings["start"] = start
+    elif blind:
+        settings["model.channels"] = BLIND[network]
     usual = yaml.safe_load(packaged_configs()[file].read_text("utf-8"))["trainer"]["max_epochs"]
     return Student(network, blind, start, file, settings, config.epochs or int(usual))
 

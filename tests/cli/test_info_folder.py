@@ -76,15 +76,13 @@ def test_a_card_without_labels_to_explain_is_warned_of(run_derain, tmp_path: Pat
     assert "falling-snow" in outcome.out
 
 
-def test_the_card_names_the_classes(facts_of, data_set: Path, tmp_path: Path) -> None:
+def test_the_card_is_named_or_else_chosen_by_the_layout(
+    facts_of, data_set: Path, tmp_path: Path
+) -> None:
     card = tmp_path / "mine.yaml"
     card.write_text("name: mine\nclasses: {3: wet, 7: grey}\nrain: [3]")
     facts = facts_of(data_set, "--card", card)
-    assert facts["card"] == "mine"
-    assert list(facts["class_share"]) == ["wet", "grey"]
-
-
-def test_the_layout_chooses_the_card_unless_it_is_stated(facts_of, data_set: Path) -> None:
+    assert (facts["card"], list(facts["class_share"])) == ("mine", ["wet", "grey"])
     (data_set / "manifest.json").unlink()
     assert facts_of(data_set)["card"] == "REHEARSE-3D"
     facts = facts_of(data_set, "--layout", "lidar_radar_pcd,elsewhere")
