@@ -127,9 +127,12 @@ def test_autocast_changes_nothing() -> None:
     assert [part.item() for part in under_autocast] == [part.item() for part in expected]
 
 
-@given(seeds, st.integers(0, 40), st.sampled_from([1, 2]))
-def test_the_loss_is_the_sum_of_the_two(seed: int, points: int, present: int) -> None:
+@given(seeds, st.integers(0, 40), st.sampled_from([1, 2]), st.booleans())
+def test_the_loss_is_the_sum_of_the_two(
+    seed: int, points: int, present: int, swapped: bool
+) -> None:
     logits, target = random_case(seed, points, classes=2, present=present)
+    target = 1 - target if swapped else target
     weight = torch.tensor([1.07, 14.84])
     short = segmentation_loss(logits.requires_grad_(), target, weight)
     cross_entropy = weighted_cross_entropy(logits, target, weight)
