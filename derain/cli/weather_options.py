@@ -86,9 +86,7 @@ def weather_options(arguments: argparse.Namespace) -> WeatherOptions:
     dry = None
     if arguments.dry is not None:
         dry = _dry_reach(arguments.dry, arguments.columns, warning, error)
-    options = WeatherOptions(every_scan, warning, error, arguments.hold, dry)
-    options.new_alarm()  # refuses levels that contradict each other
-    return options
+    return WeatherOptions(every_scan, warning, error, arguments.hold, dry)
 
 
 def warn_of_bad_weather(weather: WeatherMonitor, fail_at: str | None) -> int:
