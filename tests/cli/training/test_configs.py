@@ -33,7 +33,7 @@ ONE_STEP = [
 # Trained below, or in tests of their own.
 TRAINED = {
     *("lisnownet_rehearse3d.yaml", "outdet_wads36.yaml", "outdet_wads.yaml"),
-    *("salsanext_lite_taught.yaml", "outdet_mixture.yaml"),
+    *("salsanext_lite_taught.yaml", "outdet_mixture.yaml", "cues_worlds.yaml"),
 }
 
 NARROW = ["--model.width", "4"]
