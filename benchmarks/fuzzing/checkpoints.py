@@ -174,11 +174,11 @@ def trained() -> bytes:
 def go_on(path: Path) -> None:
     """Trains another epoch from a checkpoint, as ``derain fit --ckpt_path`` does."""
     from derain.models.checkpoint import check_resumable, network_of_checkpoint
-    from derain.workflows.training import naming_the_trainer
+    from derain.workflows.training_errors import refusals_in_a_line
 
     check_resumable(path)
     network, arguments = network_of_checkpoint(path)
-    with tempfile.TemporaryDirectory() as folder, naming_the_trainer():
+    with tempfile.TemporaryDirectory() as folder, refusals_in_a_line():
         model = network(**arguments)
         _fit(model, Path(folder), epochs=2, ckpt_path=path)
     assert all(tensor.isfinite().all() for tensor in model.state_dict().values())

@@ -92,9 +92,15 @@ def main(arguments: argparse.Namespace) -> int:
     from derain.annotation.steps import SCANS_OF_A_PLANE, annotate, road_plane
     from derain.pictures.scan_pictures import save
 
-    folders = map(_folder_of_scans, arguments.scans)
+    folders = [
+        next((path / name for name in lidar_folders() if os.path.isdir(path / name)), path)
+        for path in arguments.scans
+    ]
     source = named_frames(folders, arguments.columns, layouts=())  # one sequence, no data set
-    sequence = arguments.sequence or _sequence_of(Path(source[0].name))
+    folder = Path(source[0].name).absolute().parent
+    if folder.name in lidar_folders():  # of a sequence
+        folder = folder.parent
+    sequence = arguments.sequence or folder.name
     sink = folder_sink(arguments.out, source)
     radar = _radar_frames(arguments.radar, arguments.radar_columns, source)
     radar_sink = FolderSink(sink.folder / "radar")
@@ -127,16 +133,6 @@ def main(arguments: argparse.Namespace) -> int:
         report["picture"] = str(picture)
     print_lines(json.dumps(report) if arguments.json else _as_text(report))
     return 0
-
-
-def _folder_of_scans(path: Path) -> Path:
-    """The folder of scans in a sequence's folder; other paths stay."""
-    return next((path / name for name in lidar_folders() if os.path.isdir(path / name)), path)
-
-
-def _sequence_of(scan: Path) -> str:
-    folder = scan.absolute().parent
-    return folder.parent.name if folder.name in lidar_folders() else folder.name
 
 
 def _radar_frames(folder: Path | None, columns: Sequence[str], source: Source) -> dict[str, Frame]:

@@ -22,16 +22,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from derain.bags.names import split
+from derain.cli import options
 from derain.cli.method_options import add_runtime, runtime_of
-from derain.cli.options import (
-    add_columns,
-    add_intensity_scale,
-    add_threads,
-    count,
-    file_named,
-    labelled,
-    share,
-)
 from derain.cli.outputs import print_lines
 from derain.errors import InputError
 from derain.files.reading import is_file
@@ -53,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
     parser.add_argument("checkpoint", type=Path, help="checkpoint of derain")
     parser.add_argument(
-        "--out", type=file_named(".onnx"), required=True, help="the ONNX file to write"
+        "--out", type=options.file_named(".onnx"), required=True, help="the ONNX file to write"
     )
     parser.add_argument(
         "--int8", action="store_true", help="compute in eight bits (networks with convolutions)"
@@ -74,7 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--inside",
-        type=share,
+        type=options.share,
         help=f"share of the rain found that is within the bounds (default: {RAIN_INSIDE:g})",
     )
     parser.add_argument(
@@ -83,12 +75,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--scan", type=Path, help="scan to time the model on (default: a made-up one)"
     )
-    add_columns(parser)
-    add_intensity_scale(parser, of="calibration and labelled ")
-    add_threads(parser)
+    options.add_columns(parser)
+    options.add_intensity_scale(parser, of="calibration and labelled ")
+    options.add_threads(parser)
     add_runtime(parser, help="prove and time the file by this runtime too")
     parser.add_argument(
-        "--repeats", type=count, default=30, help="timed runs (default: %(default)s)"
+        "--repeats", type=options.count, default=30, help="timed runs (default: %(default)s)"
     )
 
 
@@ -121,7 +113,7 @@ def main(arguments: argparse.Namespace) -> int:
         notices.warn(frame.name, model.spec.issues(frame.read()))
     notices.warn_of_repeats()
     if arguments.candidates:
-        data = labelled(arguments.candidates, arguments.card, arguments.columns, scale)
+        data = options.labelled(arguments.candidates, arguments.card, arguments.columns, scale)
         inside = RAIN_INSIDE if arguments.inside is None else arguments.inside
         _fit_candidates(model, data, inside)
     print(export(model, out, calibration, runtime))

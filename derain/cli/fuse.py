@@ -35,7 +35,7 @@ from derain.cli.outputs import folder_sink, print_lines
 from derain.errors import InputError
 from derain.files import write_scan
 from derain.files.atomic import replacing
-from derain.files.extrinsics import Extrinsics, read_extrinsics
+from derain.files.extrinsics import read_extrinsics
 from derain.files.frame_times import FRAME_COLUMNS, METADATA, read_frame_times
 from derain.files.labels import LABEL, instance, read_labels, semantic, write_labels
 from derain.fusion import LABEL_WITHIN, NO_DETECTIONS, fuse, nearest_in_time
@@ -99,12 +99,14 @@ def _two_names(text: str) -> list[str]:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    out = arguments.out
-    _refuse_overwriting(out, (arguments.lidar, arguments.radar, arguments.labels))
+    scans, labels = (arguments.out / name for name in (LAYOUT.scans, LAYOUT.labels))
+    for folder in (arguments.lidar, arguments.radar, arguments.labels):
+        if folder is not None and folder.resolve() in (scans.resolve(), labels.resolve()):
+            raise InputError(arguments.out, f"would overwrite {folder}", "Give another --out.")
     extrinsics = read_extrinsics(arguments.extrinsics)
     lidar = named_frames([arguments.lidar], arguments.lidar_columns, layouts=())
     radar = named_frames([arguments.radar], arguments.radar_columns, layouts=())
-    folder_sink(out / LAYOUT.scans, lidar)
+    folder_sink(scans, lidar)
     times = _times(lidar, arguments.metadata_columns)
     nearest = nearest_in_time(times, _times(radar, arguments.metadata_columns), arguments.within)
     if (nearest < 0).all():
@@ -115,49 +117,28 @@ def main(arguments: argparse.Namespace) -> int:
         )
     partners = [radar[number] if number >= 0 else None for number in nearest.tolist()]
     extra = [name for name in arguments.extra.split(",") if name]
+    suffix = ".npz" if extra else ".bin"
     for frame, partner in tqdm(zip(lidar, partners, strict=True), total=len(lidar), disable=None):
-        _fuse(frame, partner, extrinsics, arguments.labels, arguments.label_within, extra, out)
-    folder = out / LAYOUT.scans
-    _write_metadata(folder / METADATA, lidar, times, partners)
+        scan, label, detections = _read(frame, "--lidar-columns"), None, NO_DETECTIONS
+        if partner is not None:
+            detections = _read(partner, "--radar-columns")
+        if arguments.labels is not None:
+            label = read_labels(arguments.labels / f"{frame.key}{LABEL}", len(scan))
+            scan = scan.with_label(semantic(label))
+        fused = fuse(scan, detections, extrinsics, arguments.label_within, extra)
+        write_scan(scans / f"{frame.key}{suffix}", fused)
+        if label is not None and fused.label is not None:
+            instances = np.pad(instance(label), (0, len(detections)))  # the radar's are of none
+            write_labels(labels / f"{frame.key}{LABEL}", fused.label, instances)
+    _write_metadata(scans / METADATA, lidar, times, partners)
     alone = partners.count(None)
-    print_lines(f"{len(lidar)} scans in {folder}, {alone} of them without a radar frame")
+    print_lines(f"{len(lidar)} scans in {scans}, {alone} of them without a radar frame")
     return 0
-
-
-def _refuse_overwriting(out: Path, read: Sequence[Path | None]) -> None:
-    written = {(out / name).resolve() for name in (LAYOUT.scans, LAYOUT.labels)}
-    for folder in read:
-        if folder is not None and folder.resolve() in written:
-            raise InputError(out, f"would overwrite {folder}", "Give another --out.")
 
 
 def _times(frames: Source, columns: Sequence[str]) -> NDArray[np.float64]:
     """Times of the frames in seconds, from the metadata in their folders."""
     return read_frame_times([Path(frame.name) for frame in frames], columns)
-
-
-def _fuse(
-    frame: Frame,
-    partner: Frame | None,
-    extrinsics: Extrinsics,
-    labels: Path | None,
-    label_within: float,
-    extra: Sequence[str],
-    out: Path,
-) -> None:
-    """Writes a scan with the radar frame that belongs to it, and their labels if there are any."""
-    lidar = _read(frame, "--lidar-columns")
-    radar = NO_DETECTIONS if partner is None else _read(partner, "--radar-columns")
-    path = out / LAYOUT.scans / f"{frame.key}{'.npz' if extra else '.bin'}"
-    if labels is None:
-        write_scan(path, fuse(lidar, radar, extrinsics, label_within, extra))
-        return
-    raw = read_labels(labels / f"{frame.key}{LABEL}", len(lidar))
-    fused = fuse(lidar.with_label(semantic(raw)), radar, extrinsics, label_within, extra)
-    assert fused.label is not None  # as the LiDAR's scan has some
-    write_scan(path, fused)
-    instances = np.pad(instance(raw), (0, len(radar)))  # the radar's points are of none
-    write_labels(out / LAYOUT.labels / f"{frame.key}{LABEL}", fused.label, instances)
 
 
 def _read(frame: Frame, option: str) -> Scan:

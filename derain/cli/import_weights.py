@@ -5,7 +5,7 @@ r"""Makes a checkpoint of derain from published weights.
   derain import-weights salsanext SalsaNext_valid_best --stats semantickitti --data rehearse3d \
       --grid rehearse3d --out salsanext.ckpt
 
---data names the data card of what the weights were trained on, which says their classes, rain and
+--data names the data card of what the weights were trained on, which states their classes, rain and
 licence; --stats the one whose mean and standard deviation their input was normalised by. Each is a
 packaged card or a YAML file. The published REHEARSE-3D weights of 3D-OutDet fit the statistics of
 WADS best (inferred); those of SalsaNext were trained with SemanticKITTI's. --grid names the grid of

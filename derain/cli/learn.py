@@ -14,7 +14,7 @@ describes how far to trust it, with the commands that repeat each step.
   derain run model.onnx more_scans/ --out cleaned              what it is for
 
 The default teacher is the model that comes with derain, which sees the scans before and after each;
-the network begins with the weights of the same model. Where --model or --blind asks for another
+the network begins with the weights of the same model. Where --model or --blind calls for another
 network, its weights are drawn at random. The teacher persistence goes by free space alone: solid
 things stay in their place, and drops do not. The report compares the two. Labels beside the scans
 are not read; with --card, they measure the finished model, for the record. Labels, runs and report

@@ -61,32 +61,6 @@ def _listed_methods(of_recordings: bool) -> str:
     return "\n".join(lines)
 
 
-def add_method(parser: Parser, metavar: str = "METHOD") -> None:
-    """Declares the method, its parameters and what runs it, as :func:`method_of` reads them.
-
-    Args:
-        parser: The command's parser.
-        metavar: What the method is called in the help.
-    """
-    parser.add_argument(
-        "method", metavar=metavar, help="ONNX file, YAML file of parameters, or name of a method"
-    )
-    list_methods(parser)
-    add_threads(parser)
-    add_runtime(parser, help="what runs the model")
-    parser.add_argument(
-        "--parameters", type=Path, metavar="YAML", help="parameters of the method, from derain tune"
-    )
-    parser.add_argument(
-        "--set",
-        type=_assignment,
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="set one parameter, over those of --parameters; repeatable",
-    )
-
-
 def add_runtime(parser: argparse.ArgumentParser, help: str) -> None:
     """Declares what runs a model's network.
 
@@ -121,7 +95,7 @@ def method_of(method: str, arguments: argparse.Namespace) -> Method:
 
     Args:
         method: Its name or file.
-        arguments: The options that :func:`add_method` declares.
+        arguments: The options that :func:`add_method_and_scans` declares.
 
     Raises:
         InputError: No such method, parameters of another, or some that it cannot have.
@@ -154,13 +128,29 @@ def _assignment(text: str) -> tuple[str, int | float | str]:
 
 
 def add_method_and_scans(parser: Parser, help: str) -> None:
-    """Declares a method, which need not be named, and the scans.
+    """Declares a method, which need not be named, what runs it, and the scans.
 
     Args:
         parser: The command's parser.
         help: What the scans are.
     """
-    add_method(parser, metavar="[METHOD]")
+    parser.add_argument(
+        "method", metavar="[METHOD]", help="ONNX file, YAML file of parameters, or name of a method"
+    )
+    list_methods(parser)
+    add_threads(parser)
+    add_runtime(parser, help="what runs the model")
+    parser.add_argument(
+        "--parameters", type=Path, metavar="YAML", help="parameters of the method, from derain tune"
+    )
+    parser.add_argument(
+        "--set",
+        type=_assignment,
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="set one parameter, over those of --parameters; repeatable",
+    )
     scans = parser.add_argument("scans", nargs="+", type=place_of, metavar="SCAN", help=help)
     # Where only one word is given it goes to the method, and the words are sorted afterwards. Were
     # it the method that is not required, `run dror --out cleaned scans/` would be misread.

@@ -14,7 +14,6 @@ from derain.cards.card import packaged_cards
 from derain.cli.parser import number, whole
 from derain.errors import printable
 from derain.files import DEFAULT_COLUMNS
-from derain.files.format import FORMATS
 from derain.recordings.posed import ODOMETRY, STANDING
 
 if TYPE_CHECKING:
@@ -97,23 +96,14 @@ def add_columns(
         of: Whose files they are, where a command reads several kinds.
         default: What it is where it is not given; None leaves that to the command.
     """
-    action = parser.add_argument(option, type=column_names, metavar="NAMES", default=default)
-    # Set afterwards: Python 3.14 makes the text of a help that it is given at once.
-    action.help = (
-        f"column names for {of}files without them: %(unnamed)s "
-        f"(default: {','.join(DEFAULT_COLUMNS)})"
+    parser.add_argument(
+        option,
+        type=column_names,
+        metavar="NAMES",
+        default=default,
+        help=f"column names for {of}files without them, such as .bin "
+        f"(default: {','.join(DEFAULT_COLUMNS)})",
     )
-    vars(action)["unnamed"] = _UnnamedFormats()
-
-
-class _UnnamedFormats:
-    """Which files do not name their columns, format by format.
-
-    A text that is made when help shows it, for other packages are asked what formats they bring.
-    """
-
-    def __str__(self) -> str:
-        return ", ".join(sorted({format_.UNNAMED for format_ in FORMATS.values()} - {""}))
 
 
 def add_intensity_scale(parser: argparse.ArgumentParser, of: str = "") -> None:

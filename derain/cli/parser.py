@@ -38,8 +38,8 @@ HELP_ALL = "--help-all"
 class Parser(argparse.ArgumentParser):
     """Raises InputError for a command line that it cannot understand.
 
-    Where it has options that are rarely used, ``--help`` fits a screen: it ends its description
-    with the first examples and leaves out those options, which ``--help-all`` shows.
+    Where it has options that are rarely used, ``--help`` fits a screen: its description ends with
+    the first examples, and those options are left to ``--help-all``.
 
     Attributes:
         late_epilog: Makes the end of the help when help is asked for; None where it has none.
@@ -49,41 +49,38 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
-        self._rare: list[argparse.Action] = []
+        self._rare: dict[argparse.Action, str | None] = {}
+        self._whole_description: str | None = None
         # Instead of int and float, whose names would appear in the messages.
         self.register("type", int, whole)
         self.register("type", float, number)
 
     def use_rarely(self, *options: str) -> None:
-        """Leaves options to ``--help-all``.
+        """Leaves options, and all but the first examples, to ``--help-all``.
 
         Args:
             options: Each by one of its names.
         """
-        self._rare += [self._option_string_actions[option] for option in options]
-        if HELP_ALL not in self._option_string_actions:
-            text = "show all options, and what there is to know of them"
-            self.add_argument(HELP_ALL, action=_HelpAll, nargs=0, help=text)
+        text = "show all options, and what there is to know of them"
+        self.add_argument(HELP_ALL, action=_HelpAll, nargs=0, help=text)
+        self._whole_description = self.description
+        self.description = _first_examples(self.description or "")
+        for option in options:
+            action = self._option_string_actions[option]
+            self._rare[action], action.help = action.help, argparse.SUPPRESS
 
     def format_help(self) -> str:
-        """The help, short where some options are rarely used, with its end."""
-        whole_help = {action: action.help for action in self._rare}, self.description
-        try:
-            if self._rare:
-                self.description = _first_examples(self.description or "")
-                for action in self._rare:
-                    action.help = argparse.SUPPRESS
-            return self.format_whole_help()
-        finally:
-            helps, self.description = whole_help
-            for action, text in helps.items():
-                action.help = text
-
-    def format_whole_help(self) -> str:
-        """The help with all options, and with its end."""
+        """The help with its end."""
         if self.late_epilog is not None:
             self.epilog = self.late_epilog()
         return super().format_help()
+
+    def format_whole_help(self) -> str:
+        """The help with all options, from here on."""
+        self.description = self._whole_description
+        for action, text in self._rare.items():
+            action.help = text
+        return self.format_help()
 
     def error(self, message: str) -> NoReturn:
         """Refuses a command line, with an example of a right one where something is missing."""

@@ -12,7 +12,7 @@ ENDING = [
 
 
 class Interruption(KeyboardInterrupt):
-    """A signal asks the command to end. Libraries treat it as Ctrl-C.
+    """A signal that ends the command. Libraries treat it as Ctrl-C.
 
     Args:
         signal: The signal.
@@ -25,7 +25,7 @@ class Interruption(KeyboardInterrupt):
 
 @contextmanager
 def interrupting() -> Iterator[None]:
-    """Raises :class:`Interruption` in the block when a signal asks to end.
+    """Raises :class:`Interruption` in the block when a signal is to end the command.
 
     A second one ends the process at once, as if this were not there. Signals that somebody else
     listens to, or that are to be ignored, as after ``nohup``, are left to them.

@@ -54,15 +54,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from tqdm import tqdm
 
+from derain.cli import outputs
 from derain.cli.options import add_columns, count
-from derain.cli.outputs import (
-    exit_code,
-    folder_sink,
-    noting_progress,
-    print_error,
-    print_facts,
-    print_lines,
-)
 from derain.cli.unit_options import add_executor, add_shard, executor_of, shard_of
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS
@@ -188,15 +181,15 @@ def main(arguments: argparse.Namespace) -> int:
     for name, value in DATA_SET_DEFAULTS.items():
         if getattr(arguments, name) is None:
             setattr(arguments, name, value)
-    campaign = _world_campaign(arguments) if in_world else _campaign(arguments)
+    campaign = _campaign(arguments)
     with executor_of(arguments, arguments.workers or usable_cores()) as executor:
         complete = simulate_track(arguments.out, campaign, executor, shard_of(arguments))
     if not complete:
-        print_lines(f"How far the other shards are: derain status {arguments.out}")
+        outputs.print_lines(f"How far the other shards are: derain status {arguments.out}")
         return 0
     sequences = len(campaign.names)
     scans = sequences * (1 if in_world else arguments.scans)
-    print_lines(
+    outputs.print_lines(
         f"{arguments.out}: {sequences} sequences, {scans:,} scans. "
         f"What is in them: derain info {arguments.out}"
     )
@@ -210,10 +203,14 @@ def _refuse(foreign: Iterable[str], arguments: argparse.Namespace, needs: str) -
             raise InputError(f"--{name}", f"has a meaning only {needs}", "Leave it out.")
 
 
-def _campaign(options: argparse.Namespace) -> "Campaign":
+def _campaign(options: argparse.Namespace) -> "Campaign | WorldCampaign":
+    """What is simulated: sequences of tracks, or scans of worlds."""
     from derain.simulation.campaign import FACILITY_RAIN_RATES, Campaign, Drive, partition
     from derain.simulation.radar import Radar
+    from derain.simulation.world import WorldCampaign
 
+    if options.world is not None:
+        return WorldCampaign(*partition(options.sequences), seed=options.seed, world=options.world)
     moves = options.speed, options.traffic, options.skew
     radar = not any(moves) if options.radar is None else options.radar
     return Campaign(
@@ -226,13 +223,6 @@ def _campaign(options: argparse.Namespace) -> "Campaign":
         radar=Radar() if radar else None,
         drive=Drive(*moves) if any(moves) else None,
     )
-
-
-def _world_campaign(options: argparse.Namespace) -> "WorldCampaign":
-    from derain.simulation.campaign import partition
-    from derain.simulation.world import WorldCampaign
-
-    return WorldCampaign(*partition(options.sequences), seed=options.seed, world=options.world)
 
 
 def _rain_on_scans(arguments: argparse.Namespace) -> int:
@@ -248,9 +238,9 @@ def _rain_on_scans(arguments: argparse.Namespace) -> int:
         raise InputError("--rain", "it rains on scans at one rate", "Give one, e.g. --rain 25.")
     rain, sensor = UniformRain(*arguments.rain), load_sensor(arguments.sensor or "spinning_64")
     source = named_frames(arguments.on, arguments.columns or DEFAULT_COLUMNS)
-    sink = folder_sink(arguments.out, source)
-    failures, written = Failures(print_error), 0
-    with noting_progress(lambda: f"{written:,} of {len(source):,} scans are written"):
+    sink = outputs.folder_sink(arguments.out, source)
+    failures, written = Failures(outputs.print_error), 0
+    with outputs.noting_progress(lambda: f"{written:,} of {len(source):,} scans are written"):
         for number, frame in enumerate(tqdm(source, unit="scan", disable=None)):
             seed = np.random.SeedSequence(arguments.seed, spawn_key=(number,))
             with failures.skipping_failures(frame):
@@ -265,7 +255,7 @@ def _rain_on_scans(arguments: argparse.Namespace) -> int:
                     save(figure, sink.path(frame, ".png"))
                 written += 1
                 _print_rain(frame.name, clean, rainy, int(drops.sum()), arguments.json)
-    return exit_code(len(failures.errors), len(source), "it could not rain on {scans}")
+    return outputs.exit_code(len(failures.errors), len(source), "it could not rain on {scans}")
 
 
 def _print_rain(name: str, clean: "Scan", rainy: "Scan", drops: int, as_json: bool) -> None:
@@ -274,4 +264,4 @@ def _print_rain(name: str, clean: "Scan", rainy: "Scan", drops: int, as_json: bo
     lost = before - (after - drops)
     text = f"{name}: {before:,} points, in the rain {after:,}: {drops:,} of drops, {lost:,} lost"
     facts = {"scan": name, "clean": before, "points": after, "rain": drops, "lost": lost}
-    print_facts(facts, text, as_json)
+    outputs.print_facts(facts, text, as_json)

@@ -4,7 +4,7 @@ import shlex
 
 from derain.workflows.configurations import packaged_configs
 
-# What `--help` becomes where all options are asked for.
+# What `--help` becomes where all options are to be listed.
 ALL = "--help-all"
 
 EXAMPLES = {
@@ -81,8 +81,8 @@ def train(arguments: list[str]) -> None:
         InputError: As for :func:`derain.workflows.training.run_trainer`.
     """
     from derain.cli.outputs import print_lines
+    from derain.workflows.progress import EpochLines
     from derain.workflows.training import run_trainer
-    from derain.workflows.training_progress import EpochLines
 
     words = ["--help" if argument == ALL else argument for argument in arguments]
     trainer = run_trainer(words, EXAMPLES, {"callbacks": [EpochLines()]}).trainer

@@ -24,21 +24,12 @@ from pathlib import Path
 import numpy as np
 
 from derain import __version__
+from derain.cli import options
 from derain.cli.method_options import list_methods
-from derain.cli.options import (
-    add_data,
-    add_threads,
-    command_line,
-    count,
-    file_named,
-    labelled,
-    share,
-)
 from derain.cli.outputs import print_lines
 from derain.cli.parser import Parser
 from derain.default import DEFAULT
 from derain.errors import InputError
-from derain.export.methods import PARAMETER_SUFFIXES
 from derain.export.storage import Storage
 from derain.files.atomic import require_writable
 from derain.filters import FILTERS
@@ -51,20 +42,20 @@ def add_arguments(parser: Parser) -> None:
     """Declares the command's arguments."""
     parser.add_argument("method", metavar="METHOD", help="ONNX file, default or a filter (below)")
     list_methods(parser, of_recordings=False)
-    add_data(parser, part="validation")
+    options.add_data(parser, part="validation")
     parser.add_argument(
-        "--out", type=file_named(*PARAMETER_SUFFIXES), required=True, help="YAML file to write"
+        "--out", type=options.file_named(".yaml", ".yml"), required=True, help="YAML file to write"
     )
     parser.add_argument(
-        "--scans", type=count, default=100, help="number of random scans (default: %(default)s)"
+        "--scans", type=options.count, default=100, help="number of random scans (default: 100)"
     )
     parser.add_argument(
-        "--trials", type=count, default=100, help="trials for a filter (default: %(default)s)"
+        "--trials", type=options.count, default=100, help="trials for a filter (default: 100)"
     )
     parser.add_argument("--seed", type=int, default=0, help="random seed (default: 0)")
     parser.add_argument(
         "--candidates",
-        type=share,
+        type=options.share,
         nargs="?",
         const=RAIN_INSIDE,
         metavar="SHARE",
@@ -76,7 +67,7 @@ def add_arguments(parser: Parser) -> None:
         metavar="PLACE",
         help="for the trials of a filter: FILE.journal, an SQLite file, or the URL of a database",
     )
-    add_threads(parser)
+    options.add_threads(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -91,7 +82,7 @@ def main(arguments: argparse.Namespace) -> int:
         write_parameters,
     )
 
-    data = labelled(
+    data = options.labelled(
         arguments.data,
         arguments.card,
         arguments.columns,
@@ -107,7 +98,7 @@ def main(arguments: argparse.Namespace) -> int:
         candidates = None
         if arguments.candidates is not None:
             candidates = bounds_of_rain(data, drawn, arguments.candidates)
-            every = "every point, for no bounds tell rain from the rest"
+            every = "every point, for no bounds separate rain from the rest"
             print_lines(f"candidates: {candidates or every}")
         tuned = tune_filter_on(
             method,
@@ -127,18 +118,14 @@ def main(arguments: argparse.Namespace) -> int:
         f"IoU {tuned.iou:.4f} on {len(drawn)} scans of {data.card.name}, "
         f"{tuned.default_iou:.4f} with the defaults"
     )
-    command = f"derain {__version__}: {command_line(arguments, 'method')}"
-    named = _relative_to(arguments.out.parent, method)
+    command = f"derain {__version__}: {options.command_line(arguments, 'method')}"
+    named = method
+    if method != DEFAULT and method not in FILTERS:  # a model, named by the way from the YAML file
+        folder = arguments.out.parent.resolve()
+        named = Path(os.path.relpath(Path(method).resolve(), folder)).as_posix()
     write_parameters(arguments.out, named, tuned.parameters, command, facts)
     print_lines(f"{method}: {facts}")
     for name, value in tuned.parameters.items():
         if name != CANDIDATES:  # printed already
             print(f"  {name}: {value}")
     return 0
-
-
-def _relative_to(folder: Path, method: str) -> str:
-    """The method as a file in a folder names it: a model by the way from there to it."""
-    if method == DEFAULT or method in FILTERS:
-        return method
-    return Path(os.path.relpath(Path(method).resolve(), folder.resolve())).as_posix()

@@ -27,45 +27,34 @@ cannot be read or judged are reported and shown empty; the exit code is then 2.
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from derain.bags.names import is_bag, within
 from derain.cards.card import load_card
 from derain.cards.known import layouts_for
+from derain.cli import options
 from derain.cli.method_options import list_methods
-from derain.cli.options import (
-    add_columns,
-    add_intensity_scale,
-    add_poses,
-    add_threads,
-    add_topic,
-    count,
-)
 from derain.cli.outputs import print_lines
 from derain.cli.parser import Parser, whole
 from derain.cli.playback import refuse_unusable, write_and_report
 from derain.default import DEFAULT
 from derain.errors import InputError
 from derain.example import example_file, or_example
-from derain.export.methods import load_method, named_method, split_title
+from derain.export.methods import (
+    load_method,
+    load_method_of_one_scan,
+    named_method,
+    split_title,
+)
 from derain.sources.bag_frame import NUMBER, BagFrame
 from derain.sources.folders import frame_of, named_frames
 from derain.sources.frame import Frame
-from derain.sources.method import Method
 from derain.sources.recordings import irregularities
 from derain.system.extras import MATPLOTLIB, OPEN3D, require
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
-from derain.system.stopwatch import Stopwatch
-from derain.views.scan_issues import outside_view
 from derain.workflows.odometry import placed
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from derain.export.bench.bench_entries import BenchEntry
-    from derain.scan import Scan
 
 
 def add_arguments(parser: Parser) -> None:
@@ -95,7 +84,7 @@ def add_arguments(parser: Parser) -> None:
     )
     parser.add_argument(
         "--every",
-        type=count,
+        type=options.count,
         default=1,
         metavar="N",
         help="with --rerun, show every Nth scan (default: 1)",
@@ -103,11 +92,11 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument(
         "--card", help="data card of the scans' labels (beside them or in ../labels), such as wads"
     )
-    add_columns(parser)
-    add_intensity_scale(parser)
-    add_threads(parser)
-    add_poses(parser)
-    add_topic(parser)
+    options.add_columns(parser)
+    options.add_intensity_scale(parser)
+    options.add_threads(parser)
+    options.add_poses(parser)
+    options.add_topic(parser)
 
 
 def _numbers(text: str) -> slice:
@@ -144,7 +133,10 @@ def _view_recording(arguments: argparse.Namespace) -> int:
     """Writes a recording as several methods clean it, for Rerun's viewer."""
     refuse_unusable(arguments.rerun)
     keep_freed_memory()
-    methods = _load_methods(arguments.methods, arguments.threads)
+    methods = {
+        title: load_method(*named_method(name), arguments.threads)
+        for title, name in _names_by_title(arguments.methods).items()
+    }
     card = None if arguments.card is None else load_card(arguments.card)
     found = named_frames(
         within(arguments.scans, arguments.topic),
@@ -169,39 +161,40 @@ def _view_recording(arguments: argparse.Namespace) -> int:
     return write_and_report(arguments.rerun, selection, methods, labels)
 
 
-def _load_methods(names: Sequence[str], threads: int) -> dict[str, Method]:
-    """The methods by their titles, in order.
+def _names_by_title(methods: Sequence[str]) -> dict[str, str]:
+    """Names or files of the methods by their titles, in order.
 
     Raises:
-        InputError: No such method, or two of one title.
+        InputError: Two methods of one title.
     """
-    methods: dict[str, Method] = {}
-    for text in names:
+    names: dict[str, str] = {}
+    for text in methods:
         title, name = split_title(text)
-        if title in methods:
+        if title in names:
             raise InputError(
                 title, "is the title of two methods", "Give titles: `first=a.onnx second=dror`."
             )
-        methods[title] = load_method(*named_method(name), threads)
-    return methods
+        names[title] = name
+    return names
 
 
 def _view_scan(path: Path, arguments: argparse.Namespace) -> None:
     """Draws a scan as several methods clean it, or shows it in a window."""
-    from derain.export.bench.bench_entries import bench_entries
-
-    methods = bench_entries(arguments.methods)
+    names = _names_by_title(arguments.methods)
     card = None if arguments.card is None else load_card(arguments.card)
     frame = frame_of(path, arguments.columns, layouts_for(card))
     scan = frame.with_intensity_times(arguments.intensity_scale).read()
-    notices = Notices()
-    for method in methods:
-        if method.spec_or_filter is not None:
-            notices.warn(frame.name, method.spec_or_filter.issues(scan), method.title)
     labelled = None if card is None else scan.with_label(frame.read_label(len(scan)))
-    predicted = {
-        method.title: _rain(scan, method, arguments.threads, notices) for method in methods
-    }
+    trivial = {"all": np.ones(len(scan), bool), "none": np.zeros(len(scan), bool)}
+    notices, predicted = Notices(), {}
+    for title, name in names.items():
+        if name in trivial:
+            predicted[title] = trivial[name]
+            continue
+        method = load_method_of_one_scan(*named_method(name), arguments.threads)
+        judgement = method.judge(scan)
+        notices.warn(frame.name, method.issues(judgement), title)
+        predicted[title] = judgement.rain
     title, rain = f"{_name_in_title(frame, path)}: {len(scan):,} points", None
     if card is not None and labelled is not None:
         known = ~card.unknown_of(labelled)
@@ -224,18 +217,3 @@ def _name_in_title(frame: Frame, path: Path) -> str:
     if NUMBER.fullmatch(path.name) is None:
         print_lines(f"{frame.name} is drawn, the first of {len(frame.clouds):,} clouds")
     return str(frame.path.relative_to(frame.clouds.bag.path.parent))
-
-
-def _rain(
-    scan: "Scan", method: "BenchEntry", threads: int, notices: Notices
-) -> "NDArray[np.bool_]":
-    """Points that a method calls rain, bool (N,); warns of many points outside a model's view."""
-    from derain.export.runtime import Derainer
-
-    judge = method.ready(threads)
-    if not isinstance(judge, Derainer):
-        return judge(scan, Stopwatch())
-    judgement = judge.judge(scan)
-    outside = outside_view(scan, judgement.judged, judge.spec.data)
-    notices.warn(scan.name, outside, method.title)
-    return judgement.rain

@@ -86,9 +86,7 @@ def weather_options(arguments: argparse.Namespace) -> WeatherOptions:
     dry = None
     if arguments.dry is not None:
         dry = _dry_reach(arguments.dry, arguments.columns, warning, error)
-    options = WeatherOptions(every_scan, warning, error, arguments.hold, dry)
-    options.new_alarm()  # refuses levels that contradict each other
-    return options
+    return WeatherOptions(every_scan, warning, error, arguments.hold, dry)
 
 
 def warn_of_bad_weather(weather: WeatherMonitor, fail_at: str | None) -> int:
@@ -127,7 +125,12 @@ def weather_table(path: Path | None) -> Iterator[list[Sequence[object]]]:
     if path is None:
         yield rows
         return
-    _refuse_other_file(path)
+    if is_file(path):
+        with reading(path), path.open("rb") as file:
+            start = file.read(len(FIRST_COLUMNS))
+        if start not in (FIRST_COLUMNS, b""):
+            reason = "is there already, and no table of the weather"
+            raise InputError(path, reason, "Give --weather another file.")
     require_writable(path)
     try:
         yield rows
@@ -136,18 +139,6 @@ def weather_table(path: Path | None) -> Iterator[list[Sequence[object]]]:
         csv.writer(table, lineterminator="\n").writerows([TABLE_HEAD, *rows])
         with replacing(path) as temporary:
             temporary.write_text(table.getvalue(), "utf-8", newline="")
-
-
-def _refuse_other_file(path: Path) -> None:
-    """Refuses to write the table in place of a file that is not one."""
-    if not is_file(path):
-        return
-    with reading(path), path.open("rb") as file:
-        start = file.read(len(FIRST_COLUMNS))
-    if start not in (FIRST_COLUMNS, b""):
-        raise InputError(
-            path, "is there already, and no table of the weather", "Give --weather another file."
-        )
 
 
 def _dry_reach(

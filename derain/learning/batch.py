@@ -22,9 +22,9 @@ class Sample:
     Attributes:
         scan: The whole scan, with its labels where they are known.
         view: The network's view of it.
-        target: What the network is to say of each of its cells, int64 (M,); None without labels.
-        measured: Whether what the network says is counted or written. It is not in training, nor
-            of a scan that is only read again so that all processes take as many steps.
+        target: The class of each of its cells, int64 (M,); None without labels.
+        measured: Whether the network's answers are counted or written: not in training, nor of a
+            scan that is only read again so that all processes take as many steps.
         key: What is made of the scan is named by this: the key of its frame.
         milliseconds: How long it took to make, by ``READ`` and ``VIEW``, wall time.
     """
@@ -72,10 +72,10 @@ class Batch:
 
     Attributes:
         inputs: The network's inputs by name, scans one after the other.
-        target: What the network is to say of each cell, int64 (M,); None without labels.
+        target: The class of each cell, int64 (M,); None without labels.
         cells: How many cells each scan has, in order.
-        measured: The scans, in order, where what the network says of them is counted or written;
-            else none, so that no worker sends what nobody asks for.
+        measured: The scans, in order, where the network's answers are counted or written;
+            else none, so that no worker sends what nobody needs.
         milliseconds: How long its scans took to make, one after the other, by ``READ`` and
             ``VIEW``, wall time of the process that made them.
     """

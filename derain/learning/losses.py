@@ -27,20 +27,30 @@ class SegmentationLoss(NamedTuple):
 
 
 def segmentation_loss(logits: Tensor, target: Tensor, class_weight: Tensor) -> SegmentationLoss:
-    """Weighted cross-entropy plus Lovász-softmax, as 3D-OutDet is trained.
+    """Weighted cross-entropy plus Lovász-softmax of two classes, as 3D-OutDet is trained.
+
+    It is the sum of :func:`weighted_cross_entropy` and :func:`lovasz_softmax`, several times
+    faster: both classes' errors at a point are one number, the probability of the other class, so
+    that one order serves both; and all follows from how far the logits lean to the wrong side.
 
     Source: sporsho/3D_OutDet, train_wads.py. SalsaNext (Cortinhal et al. 2020) learns from the same
     sum, with the logarithm of probabilities clamped at 1e-8 in place of the log-softmax.
 
     Args:
-        logits: Scores before the softmax, float (N, C).
-        target: Class of every point, 0 … C − 1, int64 (N,).
-        class_weight: Weight of each class, float (C,), at least 0; see :func:`class_weights`.
+        logits: Scores before the softmax, float (N, 2).
+        target: Class of every point, 0 or 1, int64 (N,).
+        class_weight: Weight of each class, float (2,), at least 0; see :func:`class_weights`.
     """
-    if logits.shape[1] == 2:
-        return _loss_of_two_classes(logits, target == 1, class_weight)
-    cross_entropy = weighted_cross_entropy(logits, target, class_weight)
-    lovasz = lovasz_softmax(at_least_float32(logits).softmax(dim=1), target)
+    logits, second = at_least_float32(logits), target == 1
+    lean = logits[:, 1] - logits[:, 0]
+    wrong = torch.where(second, -lean, lean)
+    weight = class_weight.to(wrong)[target]
+    cross_entropy = _weighted_mean(functional.softplus(wrong) * weight, weight)
+    order = wrong.detach().argsort(descending=True)
+    ordered = second[order]
+    steps = _jaccard_steps(ordered, wrong.dtype) + _jaccard_steps(~ordered, wrong.dtype)
+    present = second.any().int() + (~second).any().int()
+    lovasz = (wrong.sigmoid()[order] * steps).sum() / present.clamp(min=1)
     return SegmentationLoss(cross_entropy + lovasz, cross_entropy, lovasz)
 
 
@@ -58,8 +68,7 @@ def weighted_cross_entropy(logits: Tensor, target: Tensor, class_weight: Tensor)
     logits = at_least_float32(logits)
     class_weight = class_weight.to(logits)
     total = functional.cross_entropy(logits, target, class_weight, reduction="sum")
-    weight = class_weight[target].sum()
-    return total / weight.clamp(min=torch.finfo(weight.dtype).tiny)
+    return _weighted_mean(total, class_weight[target])
 
 
 def lovasz_softmax(probability: Tensor, target: Tensor) -> Tensor:
@@ -86,33 +95,9 @@ def lovasz_softmax(probability: Tensor, target: Tensor) -> Tensor:
     return loss.sum() / present.clamp(min=1)
 
 
-def _loss_of_two_classes(logits: Tensor, second: Tensor, class_weight: Tensor) -> SegmentationLoss:
-    """What :func:`segmentation_loss` is for two classes, several times faster.
-
-    Both classes' errors at a point are one number, the probability of the other class, so that one
-    order serves both; and all follows from how far the logits lean to the wrong side.
-
-    Args:
-        logits: Scores before the softmax, float (N, 2).
-        second: Points of the second class, bool (N,).
-        class_weight: Weight of each class, float (2,), at least 0.
-    """
-    logits = at_least_float32(logits)
-    lean = logits[:, 1] - logits[:, 0]
-    wrong = torch.where(second, -lean, lean)
-    weight = class_weight.to(wrong)[second.long()]
-    cross_entropy = _weighted_mean(functional.softplus(wrong), weight)
-    order = wrong.detach().argsort(descending=True)
-    ordered = second[order]
-    steps = _jaccard_steps(ordered, wrong.dtype) + _jaccard_steps(~ordered, wrong.dtype)
-    present = second.any().int() + (~second).any().int()
-    lovasz = (wrong.sigmoid()[order] * steps).sum() / present.clamp(min=1)
-    return SegmentationLoss(cross_entropy + lovasz, cross_entropy, lovasz)
-
-
-def _weighted_mean(values: Tensor, weight: Tensor) -> Tensor:
-    """Mean of values with a weight each; 0 where these are 0 throughout."""
-    return (values * weight).sum() / weight.sum().clamp(min=torch.finfo(weight.dtype).tiny)
+def _weighted_mean(weighted: Tensor, weight: Tensor) -> Tensor:
+    """Mean of values that are multiplied by their weights; 0 where all weights are 0."""
+    return weighted.sum() / weight.sum().clamp(min=torch.finfo(weight.dtype).tiny)
 
 
 def _jaccard_steps(foreground: Tensor, dtype: torch.dtype) -> Tensor:

@@ -1,8 +1,7 @@
 """What a model and its data agree on, once, before the first batch.
 
-The data say what there is: a card, training scans. The model says what it needs: columns, labels, a
-view fitted to some of the scans. What comes of it is the :class:`Task`, which both are given; from
-then on neither asks the other anything.
+The data have a card and training scans. The model needs columns, labels, and a view fitted to some
+of the scans. The :class:`Task` holds both; from then on neither depends on the other.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -49,7 +48,7 @@ class Task:
 
 @runtime_checkable
 class TrainingData(Protocol):
-    """What an agreement asks of a data module."""
+    """What an agreement needs of a data module."""
 
     card: DataCard
     task: Task | None

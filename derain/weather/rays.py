@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.scan import Scan
-from derain.weather.alike import repetitions, seem_distinct
 
 # Sectors of azimuth, each of 30 degrees like the hours of a clock: the first has x (ahead) in its
 # middle, the next ones follow towards y (left).
@@ -36,6 +35,15 @@ TINY = np.finfo(np.float32).tiny
 # and the higher the nearer it is.
 SCORES_IN_SECTOR = 2048
 
+# Multipliers of the hash: an odd number whose product mixes every bit into the upper ones, and what
+# makes another one of it for the next round.
+# Sources: Knuth, "The Art of Computer Programming", volume 3, 6.4 (2³² over the golden ratio);
+# Steele and Vigna 2021, "Computationally easy, spectrally good multipliers".
+MULTIPLIER, NEXT_MULTIPLIER = 2654435769, 0x915F77F5
+
+# A sample has one in so many values, and speaks for all of them if it has so many numbers.
+ONE_IN, FEWEST_SAMPLED = 16, 3000
+
 
 def ray_ends(scan: Scan, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Counts the rays of a scan by where they end.
@@ -53,9 +61,9 @@ def ray_ends(scan: Scan, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
         else, and those that end at rain.
     """
     xyz = scan.xyz
-    asked = scan.valid if scan.radar is None else scan.valid & ~scan.radar
-    if not asked.all():
-        xyz, rain = xyz[asked], rain[asked]
+    of_rays = scan.valid if scan.radar is None else scan.valid & ~scan.radar
+    if not of_rays.all():
+        xyz, rain = xyz[of_rays], rain[of_rays]
     x, y, z = np.ascontiguousarray(xyz.T)
     reach = np.sqrt(x * x + y * y + z * z)  # which need not be as exact as Scan.range
     azimuth = _azimuth_cells(x, y)
@@ -128,3 +136,67 @@ def _counted(ends: NDArray[np.int32]) -> NDArray[np.int64]:
     )
     rain = counts[:, ::-1]
     return np.stack([counts[:, :RANGE_BINS], rain[:, :RANGE_BINS]]).astype(np.int64)
+
+
+def repetitions(numbers: NDArray[np.uint32]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Finds the numbers that repeat another one.
+
+    The hash of each number names a slot of a table, into which the place of the number is written,
+    over that of any earlier number. A number whose slot holds another place repeats the number at
+    that place, or only shares the slot with it. Numbers that only share a slot, and all that equal
+    them, go into another round with another hash. They are few, while a sort, which takes five
+    times as long, moves all numbers.
+
+    Args:
+        numbers: uint32 (N,).
+
+    Returns:
+        Places of which the numbers are those at other places, (R,), in no order; and these, (R,).
+        None of these is in the first, so that leaving the first out leaves each number once.
+    """
+    table = np.empty(1 << max(2 * len(numbers), 2).bit_length(), np.int32)
+    multiplier, pending = MULTIPLIER, numbers
+    places = np.arange(len(numbers), dtype=np.int32)
+    repeating, repeated = [places[:0]], [places[:0]]
+    while len(pending):
+        found = _last_in_slot(pending, places, multiplier, table)
+        equal = numbers.take(found) == pending
+        # take is several times faster than indexing by truth values that follow no pattern.
+        repeats, sharing = np.flatnonzero(equal & (found != places)), np.flatnonzero(~equal)
+        repeating.append(places.take(repeats))
+        repeated.append(found.take(repeats))
+        places, pending = places.take(sharing), pending.take(sharing)
+        multiplier = multiplier * NEXT_MULTIPLIER % 2**32
+    return np.concatenate(repeating, dtype=np.intp), np.concatenate(repeated, dtype=np.intp)
+
+
+def seem_distinct(numbers: NDArray[np.uint32]) -> bool:
+    """Whether a sample shows that next to none of the numbers repeats another.
+
+    The sample is of values, not of places, so that it has all that equal one of it. Of few numbers
+    the answer is no.
+
+    Args:
+        numbers: uint32 (N,).
+
+    Returns:
+        Whether the sample has no repetition, and is so large that, with one chance in twenty of an
+        error, no more than three in FEWEST_SAMPLED of the values are repeated.
+
+    Source: Hanley and Lippman-Hand 1983, the rule of three.
+    """
+    sampled = np.flatnonzero(numbers * np.uint32(NEXT_MULTIPLIER) < 2**32 // ONE_IN)
+    return len(sampled) >= FEWEST_SAMPLED and not len(repetitions(numbers.take(sampled))[0])
+
+
+def _last_in_slot(
+    numbers: NDArray[np.uint32],
+    places: NDArray[np.int32],
+    multiplier: int,
+    table: NDArray[np.int32],
+) -> NDArray[np.int32]:
+    """The place that stands in the slot of each number, after all have written theirs there."""
+    lower = np.uint32(33 - len(table).bit_length())
+    slot = (numbers * np.uint32(multiplier) >> lower).astype(np.intp)
+    table[slot] = places  # only slots that were written to are read, so that it needs no zeros
+    return table.take(slot)

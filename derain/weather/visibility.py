@@ -133,7 +133,8 @@ def reach_of(ending: NDArray[np.int64], share: float) -> Visibility:
         return NOT_KNOWN
     spread = ONE_IN_TWENTY * math.sqrt(share * (1 - share) / rays)
     near, metres, far = (_within(ending, each) for each in (share - spread, share, share + spread))
-    return Visibility(metres if metres < math.inf else None, min(near, _last(ending)), far)
+    last = BIN * (len(ending) - 1)  # where the last bin begins
+    return Visibility(metres if metres < math.inf else None, min(near, last), far)
 
 
 def poisson_interval(count: int) -> tuple[float, float]:
@@ -158,11 +159,6 @@ def _within(ending: NDArray[np.int64], share: float) -> float:
     place = int(np.searchsorted(ended, wanted))
     before = int(ended[place] - ending[place])
     return BIN * (place + (wanted - before) / int(ending[place]))
-
-
-def _last(ending: NDArray[np.int64]) -> float:
-    """Where the last bin begins, metres."""
-    return BIN * (len(ending) - 1)
 
 
 def _text(metres: float) -> str:

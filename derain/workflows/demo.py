@@ -5,19 +5,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from derain.datamodules.labelled import card_of, labelled_scans, rain_rates
 from derain.datamodules.scan_data import Loading, ScanData
 from derain.default import DEFAULT
 from derain.errors import InputError
-from derain.evaluation.counts import RANGE_EDGES, band_names, band_of, table_of
 from derain.example import EXAMPLE, Truth
 from derain.export.bench.bench import Bench, Effort, run_bench
 from derain.export.bench.bench_entries import bench_entries
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.export.bench.report import SHORT, main_table
-from derain.export.methods import load_method
+from derain.export.methods import load_method, load_method_of_one_scan, named_method
 from derain.files import DEFAULT_COLUMNS
 from derain.files.atomic import require_writable
 from derain.files.labels import LABEL
@@ -29,15 +26,13 @@ from derain.sources.cleaned_scan import ScanOutcome
 from derain.sources.cleaning import CleaningObserver, CleanReport, clean
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
-from derain.sources.judgement import Judgement
 from derain.sources.source import Source
 from derain.system.cores import usable_cores
 from derain.system.notices import Notices, warn
-from derain.system.stopwatch import Stopwatch
 from derain.views.scan_issues import ScanIssue
 from derain.workflows.fit import fit
 from derain.workflows.learn import export_checkpoint
-from derain.workflows.steps import Show, Steps, show_nothing
+from derain.workflows.progress import Show, Steps, show_nothing
 from derain.workflows.tuning import tune_filter_on, write_parameters
 
 # Titles of the networks, and the beginning of their configurations' names.
@@ -90,11 +85,6 @@ class DemoConfig:
         """File of the filter's tuned parameters."""
         return self.out / "dsor.yaml"
 
-    @property
-    def steps(self) -> int:
-        """How many there are: five once, two for each network, and one where there are any."""
-        return 5 + 2 * len(self.networks) + bool(self.networks)
-
     def model(self, title: str) -> Path:
         """The ONNX file of a network."""
         return self.out / f"{DEMO_NETWORKS[title]}.onnx"
@@ -113,7 +103,8 @@ def run_demo(config: DemoConfig, show: Show = show_nothing) -> Bench:
     Raises:
         InputError: What a step raises.
     """
-    steps = Steps(show, config.steps)
+    # Cleaning, simulation, tuning, picture and comparison; cleaning once more by the first network.
+    steps = Steps(show, 5 + 2 * len(config.networks) + bool(config.networks))
     clean_given_scans(config.scan or Path(EXAMPLE), config.columns, config.out / "yours", steps)
     steps.begin(f"Simulation: rain in {len(config.streets.names)} streets")
     with processes(config.workers) as executor:
@@ -154,8 +145,11 @@ def _draw_filters(config: DemoConfig, data: ScanData, frame: Frame, steps: Steps
     steps.begin("Picture: two filters on the scan with the most rain")
     scan = data.read(frame)
     known = ~data.card.unknown_of(scan)
-    methods = bench_entries(["dror", f"dsor, tuned={config.tuned}"])
-    removed = {one.title: one.ready(0)(scan, Stopwatch())[known] for one in methods}
+    methods = {"dror": "dror", "dsor, tuned": str(config.tuned)}
+    removed = {
+        title: load_method_of_one_scan(*named_method(name)).judge(scan).rain[known]
+        for title, name in methods.items()
+    }
     title = f"{Path(frame.name).name}: {len(scan):,} points"
     rain = data.card.rain_of(scan)[known]
     save(comparison_figure(scan.take(known), removed, rain, title), picture)
@@ -185,15 +179,18 @@ def _clean(config: DemoConfig, title: str, frame: Frame, steps: Steps) -> None:
     """Cleans the sequence of a scan, and draws the scan before and after."""
     folder, model = Path(frame.name).parent, config.model(title)
     steps.begin(f"Cleaning: {folder}, by {model}")
-    drawing = Drawing(
-        config.out / "before_after.png",
-        frame.name,
-        f"Simulated rain, cleaned by {title}",
-        config.out / "cleaned",
-    )
-    method = load_method(str(model), {})
-    report = clean(named_frames([folder]), method, config.out / "cleaned", observer=drawing)
-    steps.end(f"{report}; before and after: {drawing.file}")
+    method, out = load_method(str(model), {}), config.out / "cleaned"
+    report = clean(named_frames([folder]), method, out, observer=Watch(out))
+    picture, heading = config.out / "before_after.png", f"Simulated rain, cleaned by {title}"
+    _draw_before_and_after(frame, str(model), heading, picture)
+    steps.end(f"{report}; before and after: {picture}")
+
+
+def _draw_before_and_after(frame: Frame, method: str, heading: str, picture: Path) -> None:
+    """Draws a scan, whether it is cleaned or left whole."""
+    scan = frame.read()
+    rain = load_method_of_one_scan(method, {}).judge(scan).rain
+    save(before_after_figure(scan, rain, heading), picture)
 
 
 def _compare(config: DemoConfig, data: ScanData, steps: Steps) -> Bench:
@@ -216,59 +213,32 @@ def _compare(config: DemoConfig, data: ScanData, steps: Steps) -> Bench:
     return found
 
 
-class Drawing(CleaningObserver):
-    """Draws one of the scans before and after, counts what is removed by range, and warns.
+class Watch(CleaningObserver):
+    """Warns of what is odd about scans, and finds what of the example's rain is removed.
 
     Args:
-        file: The picture.
-        scan: Name of the scan.
-        heading: Title of the picture.
         labels: Folder of the labels that the scans get.
 
     Attributes:
-        by_range: Valid points by band of range and by whether they are removed, int64 (bands, 2).
         truth: What of the rain of the example is found.
     """
 
-    def __init__(self, file: Path, scan: str, heading: str, labels: Path) -> None:
-        self.file = file
-        self.by_range = np.zeros((len(RANGE_EDGES), 2), np.int64)
+    def __init__(self, labels: Path) -> None:
         self.truth = Truth()
-        self._scan, self._heading, self._labels = scan, heading, labels
+        self._labels = labels
         self._notices = Notices()
-
-    def judged(self, judgement: Judgement) -> None:
-        """Draws the scan, whether it is written or left whole."""
-        assert judgement.frame is not None
-        self._judgement = judgement
-        if judgement.frame.name == self._scan:
-            save(before_after_figure(judgement.scan, judgement.rain, self._heading), self.file)
 
     def noticed(self, scan: str, odd: list[ScanIssue]) -> None:
         """Warns of what is odd about a scan."""
         self._notices.warn(scan, odd)
 
     def cleaned(self, outcome: ScanOutcome) -> None:
-        """Counts a scan that is written."""
-        judgement = self._judgement
-        valid = judgement.scan.valid
-        band, removed = band_of(judgement.scan.range[valid]), judgement.rain[valid]
-        self.by_range += table_of((band, removed.astype(np.int64)), self.by_range.shape)
+        """Compares the labels of a scan with those of the example."""
         self.truth.add(outcome.frame.name, self._labels / f"{outcome.frame.key}{LABEL}")
 
     def failed(self, error: InputError) -> None:
         """Warns of a scan that is left whole or cannot be read."""
         warn(str(error))
-
-    @property
-    def shares(self) -> str:
-        """Share removed in each band of range that holds points."""
-        bands = zip(band_names(), self.by_range.tolist(), strict=True)
-        return ", ".join(
-            f"{name} {removed / (kept + removed):.2%}"
-            for name, (kept, removed) in bands
-            if kept + removed
-        )
 
 
 def clean_given_scans(scans: Path, columns: Sequence[str], out: Path, steps: Steps) -> CleanReport:
@@ -284,12 +254,12 @@ def clean_given_scans(scans: Path, columns: Sequence[str], out: Path, steps: Ste
         InputError: A folder without scans, or an output that cannot be written.
     """
     steps.begin(f"Cleaning: {scans}, by the model that comes with derain")
-    source = named_frames([scans], columns)
+    source, watch = named_frames([scans], columns), Watch(out)
+    report = clean(source, load_method(DEFAULT, {}), out, observer=watch)
     heading = f"{source[0].key}, cleaned by the model that comes with derain"
-    drawing = Drawing(out / "before_after.png", source[0].name, heading, out)
-    report = clean(source, load_method(DEFAULT, {}), out, observer=drawing)
-    steps.end(f"{report}; before and after: {drawing.file}")
-    steps.show(f"        removed by range: {drawing.shares}")
-    if drawing.truth.rain:
-        steps.show(f"        {drawing.truth}")
+    picture = out / "before_after.png"
+    _draw_before_and_after(source[0], DEFAULT, heading, picture)
+    steps.end(f"{report}; before and after: {picture}")
+    if watch.truth.rain:
+        steps.show(f"        {watch.truth}")
     return report

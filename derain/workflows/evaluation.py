@@ -56,10 +56,11 @@ def teacher_answers(data: Taught) -> list[AnswersOfScan]:
     """
     held_out = evenly_spaced(data.frames("validation"), MOST_EVALUATED)
     frames = [*evenly_spaced(data.frames("train"), MOST_COUNTED), *held_out]
+    frames.sort(key=lambda frame: (frame.sequence, frame.number))
     keys = {frame.key for frame in held_out}
     return [
         AnswersOfScan(frame.key, frame.key in keys, _answers(data, frame))
-        for frame in tqdm(sorted(frames, key=_in_time), "counting", disable=None)
+        for frame in tqdm(frames, "counting", disable=None)
     ]
 
 
@@ -136,10 +137,6 @@ def _draw(results: LearnResults, data: Taught, frame: Frame, student: Student, n
     heading = f"{frame.key}: {results.teacher} and {results.student}"
     save(answers_figure(scan, data.card, rain, heading), beside)
     results.pictures[beside] = f"{frame.key}: teacher and student"
-
-
-def _in_time(frame: Frame) -> tuple[str, int]:
-    return frame.sequence, frame.number
 
 
 def scores_by_labels(frames: Sequence[Frame], taught: DataCard, name: str, student: Student) -> str:

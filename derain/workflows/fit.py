@@ -10,8 +10,8 @@ from typing import Any
 
 from lightning.pytorch.callbacks import ModelCheckpoint
 
+from derain.workflows.progress import EpochLines
 from derain.workflows.training import quiet_lightning, run_trainer
-from derain.workflows.training_progress import EpochLines
 
 
 @dataclass(frozen=True)

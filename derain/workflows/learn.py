@@ -2,8 +2,7 @@
 
 import shlex
 import shutil
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 
 from derain.annotation.manifest import FEWEST_SCANS
@@ -13,11 +12,10 @@ from derain.export.methods import load_method, named_method, over_recording
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.files.atomic import replacing, require_writable
-from derain.files.reading import reading
 from derain.models.checkpoint import load_model
 from derain.recordings.posed import ODOMETRY, STANDING
 from derain.sources.folders import named_frames
-from derain.sources.frame import Frame
+from derain.sources.judging import Failures, Guard
 from derain.sources.method import Method
 from derain.sources.recordings import recordings_of
 from derain.sources.records import POSES
@@ -26,10 +24,10 @@ from derain.system.memory import keep_freed_memory
 from derain.system.notices import recorded_warnings, warn
 from derain.workflows.evaluation import beside_persistence, evaluate_student, teacher_answers
 from derain.workflows.fit import fit, fit_options
-from derain.workflows.learn_config import LearnConfig, Student, student_of
+from derain.workflows.learn_config import PERSISTENCE, LearnConfig, Student, student_of
 from derain.workflows.learn_report import LEAST_RAIN, LearnResults, write_report
 from derain.workflows.odometry import find_poses, placed
-from derain.workflows.steps import Show, Steps, show_nothing
+from derain.workflows.progress import Show, Steps, show_nothing
 from derain.workflows.teaching import teach_recordings
 
 # A folder with this file may be cleared by a second run.
@@ -63,7 +61,13 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
             else; nothing to be learnt; or what a step raises. No model is left then.
     """
     source = named_frames(config.recordings, config.columns)
-    _refuse_too_few(config, source)
+    if len(source) < FEWEST_SCANS:
+        scans = "1 scan" if len(source) == 1 else f"{len(source)} scans"
+        raise InputError(
+            config.recordings[0],
+            f"{scans}: too few to learn from some and choose by others",
+            f"Record {FEWEST_SCANS} or more, one right after the other; twenty are enough.",
+        )
     student = student_of(config, source)
     require_writable(config.out)
     _clear(config.work)
@@ -79,6 +83,8 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
         recording = placed(found, poses)
         _teach(config, teacher, recording, steps, warnings)
         data = Taught(str(config.taught))
+        # Scans suit persistence, another teacher, where this one sees several at a time.
+        is_compared = config.teacher != PERSISTENCE and not teacher.window.is_one_scan
         results = LearnResults(
             title=", ".join(map(str, config.recordings)),
             teacher=config.teacher,
@@ -86,9 +92,7 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
             model=config.out,
             path=config.work / "report.md",
             scans=teacher_answers(data),
-            persistence=beside_persistence(data, recording)
-            if config.is_compared(teacher)
-            else None,
+            persistence=beside_persistence(data, recording) if is_compared else None,
             stood=config.poses == STANDING,
             sees_intensity=student.sees_unit,
             warnings=warnings,
@@ -145,17 +149,6 @@ def _settings(config: LearnConfig, student: Student) -> dict[str, object]:
     }
 
 
-def _refuse_too_few(config: LearnConfig, source: Source) -> None:
-    """Refuses a recording in which nothing can be held out."""
-    if len(source) < FEWEST_SCANS:
-        scans = "1 scan" if len(source) == 1 else f"{len(source)} scans"
-        raise InputError(
-            config.recordings[0],
-            f"{scans}: too few to learn from some and choose by others",
-            f"Record {FEWEST_SCANS} or more, one right after the other; twenty are enough.",
-        )
-
-
 def _clear(work: Path) -> None:
     """Makes the folder of everything but the model anew.
 
@@ -174,6 +167,11 @@ def _clear(work: Path) -> None:
         temporary.write_text("Written by derain learn, which clears this folder.\n", "utf-8")
 
 
+def _warning_guard() -> Guard:
+    """Turns what is wrong with one scan into a warning; the others go on."""
+    return Failures(lambda error: warn(str(error))).skipping_failures
+
+
 def _poses_file(config: LearnConfig, source: Source) -> Path:
     return config.work / (POSES if len(recordings_of(source)) == 1 else "poses")
 
@@ -188,7 +186,7 @@ def _find_poses(config: LearnConfig, source: Source, steps: Steps) -> str | None
         return config.poses
     file = _poses_file(config, source)
     steps.begin(f"Odometry: poses of {len(source):,} scans")
-    recordings = find_poses(source, file, guard=_warning_of)
+    recordings = find_poses(source, file, guard=_warning_guard())
     faults = [found.fault for found in recordings if found.fault is not None]
     if len(faults) == len(recordings):
         raise faults[0]
@@ -207,7 +205,7 @@ def _teach(
         InputError: So few scans are labelled that none of them is held out.
     """
     steps.begin(f"Teaching: {config.teacher} labels the scans")
-    results = teach_recordings(teacher, recording, config.taught, guard=_warning_of)
+    results = teach_recordings(teacher, recording, config.taught, guard=_warning_guard())
     labelled = len(results.manifest.scans)
     if not results.held_out:
         reason = f": {warnings[0]}" if warnings else ""
@@ -218,16 +216,6 @@ def _teach(
             "Record scans that overlap.",
         )
     steps.end(f"{labelled:,} scans labelled")
-
-
-@contextmanager
-def _warning_of(frame: Frame) -> Iterator[None]:
-    """Turns what is wrong with one scan into a warning; the others go on."""
-    try:
-        with reading(Path(frame.name)):
-            yield
-    except InputError as error:
-        warn(str(error))
 
 
 def _refuse_clean(results: LearnResults) -> None:

@@ -11,7 +11,6 @@ from derain.errors import InputError
 from derain.export.methods import CUES
 from derain.files import DEFAULT_COLUMNS
 from derain.recordings.posed import ODOMETRY
-from derain.sources.method import Method
 from derain.sources.source import Source
 from derain.spec import Spec
 from derain.workflows.configurations import packaged_configs
@@ -50,7 +49,7 @@ class LearnConfig:
         card: Data card of the scans' own labels, which measure the finished model; None measures
             nothing.
         start: The trained model whose weights the network begins with. None draws them at random
-            where a network is named, or one without intensity is asked for, and else begins with
+            where a network is named, or one without intensity is wanted, and else begins with
             the model that comes with derain.
     """
 
@@ -90,7 +89,7 @@ class LearnConfig:
     def needs_odometry(self, source: Source) -> bool:
         """Whether poses are to be found before the teaching.
 
-        The configuration asks for that, or the teacher cannot do without and nothing states them.
+        The configuration names odometry, or the teacher needs poses that no file states.
 
         Args:
             source: The scans.
@@ -100,14 +99,6 @@ class LearnConfig:
         """
         known = self.poses is not None or all(frame.pose is not None for frame in source)
         return self.poses == ODOMETRY or (self.teacher == PERSISTENCE and not known)
-
-    def is_compared(self, teacher: Method) -> bool:
-        """Whether persistence, another teacher, can be compared with the one that is chosen.
-
-        Args:
-            teacher: The teacher. Scans suit persistence where this one sees several at a time.
-        """
-        return self.teacher != PERSISTENCE and not teacher.window.is_one_scan
 
 
 @dataclass(frozen=True)
@@ -154,27 +145,27 @@ def student_of(config: LearnConfig, source: Source) -> Student:
             folder to be cleared, that is of another network, or that sees intensity where the
             student is to be blind or the scans have none.
     """
-    blind = config.blind or source[0].read().intensity is None
+    sees_intensity = source[0].read().intensity is not None and not config.blind
     start = config.begins_with
     if start is None:
         network = config.model or STUDENTS[0]
-        file, settings = _configuration(network)
+        blind = not sees_intensity and network != CUES
         if network == CUES:
-            blind = False
             _refuse_blind(config.blind, f"{CUES} weighs intensity, as each scan shows it")
-        elif blind:
-            settings["model.channels"] = BLIND[network]
     else:
         spec = _spec_of_start(config, start)
-        if "intensity" in spec.channels and blind and not config.blind:
+        network, blind = spec.network, not spec.weighs_intensity
+        if "intensity" in spec.channels and not sees_intensity:
             raise InputError(
                 config.recordings[0],
                 f"has no intensities, which {start} sees",
                 "Give a start that is blind to intensity, or name a network by --model.",
             )
-        network, blind = spec.network, not spec.weighs_intensity
-        file, settings = _configuration(network)
+    file, settings = _configuration(network)
+    if start is not None:
         settings["start"] = start
+    elif blind:
+        settings["model.channels"] = BLIND[network]
     usual = yaml.safe_load(packaged_configs()[file].read_text("utf-8"))["trainer"]["max_epochs"]
     return Student(network, blind, start, file, settings, config.epochs or int(usual))
 

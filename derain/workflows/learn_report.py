@@ -1,6 +1,6 @@
 """The report on a network that a teacher has taught: how far to trust it, and when not to."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -146,16 +146,17 @@ def as_markdown(results: LearnResults) -> str:
     ]
     parts += [
         f"## The teacher: {results.teacher}",
-        _teacher_table(results.taught),
+        _table(("not rain", "rain", "not known"), results.taught, _of_teacher),
     ]
     if results.persistence is not None:
-        parts += [BESIDE_PERSISTENCE, _persistence_table(results.persistence)]
+        header = ("rain to persistence", "not known to it", "rain to the teacher")
+        parts += [BESIDE_PERSISTENCE, _table(header, results.persistence, _of_persistence)]
     parts += _pictures(results.pictures, "teacher")
     if results.evaluated:
         parts += [
             f"## The student: {results.student}",
             AGREEMENT_EXPLAINED,
-            _student_table(results.agreement),
+            _table(("removed", "P", "R", "IoU"), results.agreement, _of_student),
         ]
         parts += _pictures(results.pictures, "removed")
         parts += ["## Held-out scans", *_pictures(results.pictures, "held_out")]
@@ -256,36 +257,27 @@ def _doubts_of_student(results: LearnResults) -> Iterator[str]:
         )
 
 
-def _teacher_table(answers: Answers) -> str:
-    rows = [
-        [name, f"{band.points:,}", *(f"{share:.1%}" for share in band.shares)]
-        for name, band in _bands(answers).items()
-    ]
-    return markdown_table(("range", "points", "not rain", "rain", "not known"), rows)
-
-
-def _persistence_table(answers: Answers) -> str:
-    rows = [
-        [name, f"{band.points:,}", *(f"{share:.1%}" for share in (*band.shares[1:], band.removed))]
-        for name, band in _bands(answers).items()
-    ]
-    header = ("range", "points", "rain to persistence", "not known to it", "rain to the teacher")
-    return markdown_table(header, rows)
-
-
-def _student_table(answers: Answers) -> str:
-    rows = []
-    for name, band in _bands(answers).items():
-        counts = band.agreement
-        scores = map(number_text, (counts.precision, counts.recall, counts.iou))
-        rows.append([name, f"{band.points:,}", f"{band.removed:.1%}", *scores])
-    return markdown_table(("range", "points", "removed", "P", "R", "IoU"), rows)
-
-
-def _bands(answers: Answers) -> dict[str, Answers]:
-    """The answers in all, and in each band of range that has points."""
+def _table(
+    header: Sequence[str], answers: Answers, cells: Callable[[Answers], Iterable[str]]
+) -> str:
+    """A table with a row for all points, and one for each band of range that has points."""
     bands = {"all": answers, **coarse_bands(answers)}
-    return {name: band for name, band in bands.items() if band.points}
+    rows = [[name, f"{band.points:,}", *cells(band)] for name, band in bands.items() if band.points]
+    return markdown_table(("range", "points", *header), rows)
+
+
+def _of_teacher(band: Answers) -> Iterable[str]:
+    return [f"{share:.1%}" for share in band.shares]
+
+
+def _of_persistence(band: Answers) -> Iterable[str]:
+    return [f"{share:.1%}" for share in (*band.shares[1:], band.removed)]
+
+
+def _of_student(band: Answers) -> Iterable[str]:
+    counts = band.agreement
+    scores = map(number_text, (counts.precision, counts.recall, counts.iou))
+    return f"{band.removed:.1%}", *scores
 
 
 def _pictures(pictures: Mapping[Path, str], beginning: str) -> list[str]:

@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from dataclasses import replace as replaced
 from itertools import pairwise
@@ -214,28 +214,24 @@ def _files_of(recordings: Sequence[Sequence[Frame]], out: Path, replace: bool) -
 def _refuse_to_overwrite(file: Path, recording: Sequence[Frame], replace: bool) -> None:
     target = os.path.realpath(file)
     for frame in recording:
-        for own in filter(None, (Path(frame.name), frame.label_path)):
-            if os.path.realpath(own) == target:
-                raise InputError(file, "is one of the scans or their labels", "Name another file.")
-    for folder in _folders(recording):
-        for record in RECORDS:
-            if os.path.realpath(folder / record) != target or not is_file(file):
-                continue
-            if record != POSES:
-                raise InputError(file, "came with the scans", "Name another file.")
-            if not replace:
-                raise InputError(
-                    file,
-                    "holds poses that came with the scans",
-                    "Name another file, or replace them with --replace.",
-                )
-
-
-def _folders(recording: Sequence[Frame]) -> Iterator[Path]:
-    """The folders in which records of a recording may lie."""
-    folder = Path(recording[0].name).parent
-    yield folder
-    yield folder_above(folder)
+        if target in (
+            os.path.realpath(frame.name),
+            os.path.realpath(frame.label_path or frame.name),
+        ):
+            raise InputError(file, "is one of the scans or their labels", "Name another file.")
+    scans = Path(recording[0].name).parent
+    records = [Path(folder, name) for folder in (scans, folder_above(scans)) for name in RECORDS]
+    for record in records:
+        if os.path.realpath(record) != target or not is_file(file):
+            continue
+        if record.name != POSES:
+            raise InputError(file, "came with the scans", "Name another file.")
+        if not replace:
+            raise InputError(
+                file,
+                "holds poses that came with the scans",
+                "Name another file, or replace them with --replace.",
+            )
 
 
 def _times(recording: Sequence[Frame], form: PoseFormat) -> list[float]:
@@ -251,7 +247,7 @@ def _times(recording: Sequence[Frame], form: PoseFormat) -> list[float]:
         lacking = next(frame for frame in recording if frame.time is None)
         raise InputError(
             lacking.name,
-            "nothing says when it was taken, and a line of TUM's form begins with the time",
+            "its time is not known, and a line of TUM's form begins with the time",
             "Write a times.txt beside the scans, a line of seconds each, or take --format kitti.",
         )
     # Poses are found again by their times, which have to ascend.

@@ -11,10 +11,14 @@ from typing import Any
 
 import torch
 from jsonargparse import DefaultHelpFormatter, Namespace
-from lightning.fabric.utilities.exceptions import MisconfigurationException
-from lightning.pytorch import Trainer
+from lightning.pytorch import LightningModule, Trainer
 from lightning.pytorch.callbacks import LearningRateMonitor, ModelCheckpoint
-from lightning.pytorch.cli import ArgsType, LightningArgumentParser, LightningCLI
+from lightning.pytorch.cli import (
+    ArgsType,
+    LightningArgumentParser,
+    LightningCLI,
+    SaveConfigCallback,
+)
 from lightning.pytorch.loggers import TensorBoardLogger
 from torch.distributed import is_torchelastic_launched
 
@@ -29,8 +33,9 @@ from derain.datamodules.simulated import Simulated
 from derain.datamodules.taught import Taught
 from derain.datamodules.wads import Wads
 from derain.datamodules.worlds import Worlds
-from derain.default.model_card import LARGEST_SEED
+from derain.default import LARGEST_SEED
 from derain.errors import InputError, reason_of
+from derain.files.atomic import replacing
 from derain.files.documents import Entry
 from derain.models.base import DerainingModule
 from derain.models.callbacks.best_checkpoint import BestCheckpoint
@@ -54,13 +59,13 @@ from derain.system.memory import KEPT_IN_TRAINING, keep_freed_memory
 from derain.system.open3d_import import warn_where_tensorboard_cannot_start
 from derain.system.workers import exit_with_launcher
 from derain.workflows.configurations import with_packaged_configs
-from derain.workflows.run_folder import (
-    WholeConfig,
-    folder_of_run,
-    logging_to_run_folder,
-)
 from derain.workflows.start import START_HELP, checkpoint_of
-from derain.workflows.training_errors import HINT, as_input_error, known_options
+from derain.workflows.training_errors import (
+    as_input_error,
+    known_options,
+    of_the_trainer,
+    refusals_in_a_line,
+)
 
 # What `--ckpt_path` may be besides a file: checkpoints that Lightning looks for itself.
 FOUND_BY_LIGHTNING = ("last", "hpc")
@@ -69,14 +74,11 @@ FOUND_BY_LIGHTNING = ("last", "hpc")
 MESSAGES = logging.getLogger("lightning.pytorch.utilities.rank_zero")
 LOGGERS = ("lightning.pytorch", "lightning.fabric")
 
-# Numbers that Lightning and the callbacks take as they are.
-LEAST = {
-    "trainer.accumulate_grad_batches": 1,
-    "trainer.log_every_n_steps": 0,
-    "panels.scans": 0,
-    "panels.pictures": 0,
-    "errors.pictures": 0,
-}
+# Numbers that torch and the callbacks take as they are.
+NOT_NEGATIVE = ("seed_everything", "panels.scans", "panels.pictures", "errors.pictures")
+
+# Where a training's folder has its checkpoints, and its configuration.
+CHECKPOINTS, CONFIGURATION = "checkpoints", "config.yaml"
 
 
 class ExamplesFormatter(argparse.RawDescriptionHelpFormatter, DefaultHelpFormatter):
@@ -164,26 +166,25 @@ class DerainCLI(LightningCLI):
     def _check_options(self) -> None:
         """Refuses values of options that torch or Lightning would stumble over later."""
         config = self.config[self.config.subcommand]
-        seed = Entry("--seed_everything", "", config.seed_everything)
-        if not isinstance(seed.value, bool):
-            seed.whole(0, LARGEST_SEED)
-        for option, least in LEAST.items():
-            number = config.get(option)
-            if isinstance(number, int) and number < least:
-                raise InputError(f"--{option}", f"{number} is too few", f"Give {least} or more.")
+        for option in NOT_NEGATIVE:
+            number = Entry(f"--{option}", "", config.get(option))
+            if not isinstance(number.value, bool):  # a seed may be
+                number.whole(0, LARGEST_SEED)
         arguments = config.model.get("init_args") or {}
         check_hyperparameters(
             {name: Entry(f"--model.{name}", "", value) for name, value in arguments.items()}
         )
 
     def _log_beside(self, checkpoint: Path, arguments: list[str]) -> None:
-        """Has a test log into the folder of its training, unless it was told where to."""
-        told = any(argument.startswith("--trainer.logger") for argument in arguments)
-        folder, logger = folder_of_run(checkpoint), self.config.test.trainer.logger
-        if folder is None or told or not isinstance(logger, Namespace):
+        """Logs a test into the folder of its training, unless an option names another logger."""
+        chosen = any(argument.startswith("--trainer.logger") for argument in arguments)
+        folder = checkpoint.resolve().parent
+        run, logger = folder.parent, self.config.test.trainer.logger
+        of_training = folder.name == CHECKPOINTS and (run / CONFIGURATION).is_file()
+        if chosen or not of_training or not isinstance(logger, Namespace):
             return
         if logger.class_path.endswith(TensorBoardLogger.__name__):
-            place = {"save_dir": str(folder.parent), "name": "", "version": folder.name}
+            place = {"save_dir": str(run.parent), "name": "", "version": run.name}
             for name, value in place.items():
                 logger.init_args[name] = value
 
@@ -196,7 +197,7 @@ class DerainCLI(LightningCLI):
         try:
             return save_whole(super().instantiate_trainer(**processes_of_torchrun(), **kwargs))
         except (ValueError, TypeError) as error:  # Lightning checks some options in these ways
-            raise _of_the_trainer(error) from error
+            raise of_the_trainer(error) from error
 
     def instantiate_classes(self) -> None:
         """Instantiates data, model and trainer; what they find wrong is not the parser's error."""
@@ -222,22 +223,22 @@ def processes_of_torchrun() -> dict[str, int]:
     return {"num_nodes": int(machines), "devices": int(processes)}
 
 
-def _of_the_trainer(error: Exception) -> InputError:
-    """What Lightning finds wrong with its options; it names them itself."""
-    return InputError("--trainer", str(error).rstrip(".!"), HINT)
+class WholeConfig(SaveConfigCallback):
+    """Writes the configuration of a run as ``config.yaml``, whole or not at all.
 
-
-@contextmanager
-def naming_the_trainer() -> Iterator[None]:
-    """Turns what Lightning refuses, before a training or in it, into one line.
-
-    Raises:
-        InputError: Lightning refused something.
+    That of a test, which writes into the folder of the training, goes beside it, as ``test.yaml``.
     """
-    try:
-        yield
-    except MisconfigurationException as error:
-        raise _of_the_trainer(error) from error
+
+    def setup(self, trainer: Trainer, pl_module: LightningModule, stage: str) -> None:
+        """Writes it where the run's log goes, once."""
+        folder = trainer.log_dir  # every process reads it: the first sends it to the others
+        if folder is None or "://" in folder:
+            super().setup(trainer, pl_module, stage)
+        elif trainer.is_global_zero and not self.already_saved:
+            name = "test.yaml" if stage == "test" else self.config_filename
+            with replacing(Path(folder) / name) as temporary:
+                self.parser.save(self.config, temporary, skip_none=False, overwrite=True)
+            self.already_saved = True
 
 
 def run_trainer(
@@ -267,7 +268,7 @@ def run_trainer(
         "exit_on_error": False,  # faults become InputErrors
     }
     texts = descriptions or {}
-    with logging_to_run_folder(), naming_the_trainer():
+    with refusals_in_a_line():
         return DerainCLI(
             DerainingModule,
             ScanDataModule,

@@ -1,10 +1,12 @@
-"""The options of Lightning's command line, and one line for what it cannot use."""
+"""One line for what Lightning's command line, its trainer or the system refuses."""
 
 import difflib
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 
 from jsonargparse import ArgumentParser
+from lightning.fabric.utilities.exceptions import MisconfigurationException
 
 from derain.errors import InputError
 from derain.models.former_names import FORMER_OPTIONS
@@ -34,7 +36,7 @@ OF_OTHER_PROGRAMS = {
 
 HINT = "All options: --help-all."
 
-# What only says that something below it went wrong, or where.
+# Lines that only lead to the fault below them.
 _HEADINGS = ("Parser key", "Does not validate", "Subtypes:", "Errors:", "Problem with", "Given ")
 
 
@@ -98,3 +100,29 @@ def _unusable(subject: str, message: str) -> InputError:
     if others or not (kinds and given):
         return InputError(subject, "; ".join(others or faults), HINT)
     return InputError(subject, f"cannot be {given['value']}", f"Give: {' or '.join(kinds)}.")
+
+
+def of_the_trainer(error: Exception) -> InputError:
+    """One line for options that Lightning's trainer refuses; it names them itself."""
+    return InputError("--trainer", str(error).rstrip(".!"), HINT)
+
+
+@contextmanager
+def refusals_in_a_line() -> Iterator[None]:
+    """Turns what Lightning or the system refuses, before a training or in it, into one line.
+
+    Raises:
+        InputError: Lightning refused something, or a file of the run cannot be written.
+    """
+    try:
+        yield
+    except MisconfigurationException as error:
+        raise of_the_trainer(error) from error
+    except OSError as error:
+        if error.errno is None:  # Lightning raises errors of its own as the system's
+            raise
+        raise InputError(
+            error.filename or "the run's folder",
+            f"cannot be written ({error.strerror})",
+            "Choose a folder that is writable and has room: --trainer.logger.save_dir.",
+        ) from error

@@ -23,17 +23,15 @@ from derain.export.tuning import (
 from derain.files.atomic import replacing
 from derain.filters import filter_from
 from derain.filters.derainer import CANDIDATES
-from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.training_record import training_overlap
 from derain.system.notices import Notices, warn
 from derain.views.candidate_fit import fit_candidates
 from derain.views.candidates import Candidates
-from derain.views.scan_issues import ScanChecker, outside_view
 
 
 def bounds_of_rain(data: ScanData, frames: Sequence[Frame], inside: float) -> Candidates | None:
-    """Bounds that hold a share of the scans' rain; None if no bounds tell rain from the rest.
+    """Bounds that hold a share of the scans' rain; None if no bounds separate rain from the rest.
 
     Args:
         data: How the scans are read.
@@ -86,7 +84,8 @@ def tune_filter_on(
     notices, default, neighbours = Notices(), filter_from(name, {}), neighbours_to_find(name)
     scans = {}
     for frame in tqdm(frames, desc="finding neighbours", unit="scan", disable=None):
-        scan = _read(data, default, notices, frame)
+        scan = data.read_measured(frame)
+        notices.warn(frame.name, default.issues(scan))
         found = LabelledNeighbourhoods.of(scan, data.card, neighbours, threads, candidates)
         scans[frame.name] = found
     require_rain(any(scan.rain.any() for scan in scans.values()), data.card, "--data")
@@ -116,11 +115,10 @@ def tune_model_on(name: str, data: ScanData, frames: Sequence[Frame], threads: i
         warn(note)
     scans = []
     for frame in tqdm(frames, desc="judging", unit="scan", disable=None):
-        scan = _read(data, derainer.spec, notices, frame)
+        scan = data.read_measured(frame)
         known = scan.valid & ~data.card.unknown_of(scan)
         judgement = derainer.judge(scan)
-        outside = outside_view(scan, judgement.judged, derainer.spec.data)
-        notices.warn(frame.name, outside)
+        notices.warn(frame.name, derainer.issues(judgement))
         scans.append((judgement.probability[known], data.card.rain_of(scan)[known]))
     require_rain(any(rain.any() for _, rain in scans), data.card, "--data")
     notices.warn_of_repeats()
@@ -144,10 +142,3 @@ def write_parameters(
     text = yaml.safe_dump({"method": method, **parameters}, sort_keys=False)
     with replacing(path) as temporary:
         temporary.write_text("".join(f"# {line}\n" for line in comments) + text, "utf-8")
-
-
-def _read(data: ScanData, checker: ScanChecker, notices: Notices, frame: Frame) -> Scan:
-    """Reads a scan, and warns of what is odd about it for the method."""
-    scan = data.read_measured(frame)
-    notices.warn(frame.name, checker.issues(scan))
-    return scan

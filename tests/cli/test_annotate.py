@@ -73,7 +73,7 @@ def test_a_sequence_is_labelled_counted_and_drawn(annotate, tmp_path: Path, sequ
         assert (label[low] == TrackClass.ROAD).mean() > 0.99
 
 
-def test_the_text_says_the_plane_and_the_points_by_class(annotate, tmp_path: Path) -> None:
+def test_the_text_holds_the_plane_and_the_points_by_class(annotate, tmp_path: Path) -> None:
     lines = annotate(tmp_path / "out", "--no-picture").out.splitlines()
     assert lines[0] == "sequence 003: 3 scans, 6,000 points"
     assert lines[1].startswith("road: 1.")

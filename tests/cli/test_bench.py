@@ -7,18 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from numpy.typing import NDArray
 
 from derain.evaluation.hard_cases import scene
 from derain.export.bench import bench
-from derain.export.bench.bench_entries import BenchEntry
-from derain.export.bench.cost import Timing, measure_in_process
+from derain.export.bench.cost import measure_in_process
 from derain.export.runtime import Derainer
 from derain.files.labels import write_labels
-from derain.scan import Scan
 from derain.simulation.campaign import MAKER
-from derain.sources.file_frame import FileFrame
-from derain.system.stopwatch import Stopwatch
 
 FILES = ["bench.csv", "bench.json", "bench.md", "speed_error.png"]
 METHODS = ["dror", "position", "intensity", "all", "none"]
@@ -78,31 +73,6 @@ def test_every_method_and_baseline_stands_in_one_table(
     assert all(f"| {name} " in outcome.out for name in rows)
 
 
-def test_intensities_of_another_unit_are_warned_of_and_scaled(
-    run_derain, root: Path, tmp_path: Path, onnx_model: Path
-) -> None:
-    methods = ["--methods", f"net={onnx_model}", "ssr", "intensity", "dror"]
-    arguments = ["bench", "--data", root, *methods, *ONCE, "--out"]
-    assert run_derain(*arguments, tmp_path / "whole").said == []
-    for path in root.rglob("*.bin"):
-        points = np.fromfile(path, np.float32).reshape(-1, 4)
-        (points / np.array([1, 1, 1, 256], np.float32)).tofile(path)
-    first = root / "sequences/002/lidar_radar_pcd/0.bin"
-    net, ssr, *more = run_derain(*arguments, tmp_path / "small").said
-    assert net.startswith(f"derain: warning: {first}: net: mean intensity 0.")
-    assert ssr.startswith(f"derain: warning: {first}: ssr: intensities of 0..1, but 0..255")
-    assert more == [
-        f"derain: warning: 2 more scans: {title}: intensity of a smaller unit"
-        for title in ("net", "ssr")
-    ]
-    assert run_derain(*arguments, tmp_path / "scaled", "--intensity-scale", "256").said == []
-    whole, small, scaled = (
-        [row["counts"] for row in read_report(tmp_path / name)["rows"]]
-        for name in ("whole", "small", "scaled")
-    )
-    assert scaled == whole != small
-
-
 def test_processes_score_what_one_does_and_warn_of_the_same(
     run_derain, root: Path, tmp_path: Path, onnx_model: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -125,21 +95,6 @@ def scores(folder: Path) -> list[dict[str, Any]]:
         {name: value for name, value in row.items() if not name.startswith(costs)}
         for row in read_report(folder)["rows"]
     ]
-
-
-def test_methods_are_timed_on_scaled_intensities(root: Path) -> None:
-    scan = root / "sequences/002/lidar_radar_pcd/0.bin"
-    frame = FileFrame(key="0", path=scan)
-    seen: list[float] = []
-
-    def judge(scan: Scan, stopwatch: Stopwatch) -> NDArray[np.bool_]:
-        seen.append(float(scan.intensity.max()))
-        return scan.valid
-
-    measure_in_process(
-        BenchEntry("t", "t", lambda threads: judge), Timing([frame], intensity_scale=2.0)
-    )
-    assert set(seen) == {2 * np.fromfile(scan, np.float32).reshape(-1, 4)[:, 3].max()}
 
 
 @pytest.fixture
@@ -222,11 +177,6 @@ def test_baselines_learn_nothing_from_points_that_may_be_rain_or_not(
         assert list(row["counts"].values()) == [4, 0, 0, 40], row["method"]
 
 
-@pytest.mark.parametrize(
-    ("test_options", "bench_options", "points"),
-    [([], [], 300), (["--data.loading.deduplicate", "false"], ["--no-distinct"], 420)],
-    ids=["as the card says", "not"],
-)
 def test_points_that_a_scan_holds_twice_are_counted_as_derain_test_counts_them(
     succeed,
     wads: list[str],
@@ -234,26 +184,26 @@ def test_points_that_a_scan_holds_twice_are_counted_as_derain_test_counts_them(
     checkpoint: Path,
     onnx_model: Path,
     monkeypatch: pytest.MonkeyPatch,
-    test_options: list[str],
-    bench_options: list[str],
-    points: int,
 ) -> None:
     monkeypatch.chdir(tmp_path)
     rows = np.random.default_rng(0).permutation(np.resize(np.arange(300), 420))
     scan = tmp_path / "WADS/sequences/02/velodyne/0.bin"
     scene(300)[rows].tofile(scan)
     write_labels(scan.parent.parent / "labels/0.label", np.where(rows >= 240, 110, 40))
-    succeed("test", *wads, "--ckpt_path", checkpoint, *test_options)
+    succeed("test", *wads, "--ckpt_path", checkpoint)
     (report,) = (json.loads(path.read_text()) for path in tmp_path.rglob("test.json"))
-    options = ["--data", scan, "--card", "wads", "--methods", onnx_model, *bench_options, *ONCE]
+    options = ["--data", scan, "--card", "wads", "--methods", onnx_model, *ONCE]
+    succeed("bench", *options, "--no-distinct", "--out", "all")
+    every = read_report(Path("all"))
+    assert "--no-distinct" in every["command"]
+    assert sum(every["rows"][0]["counts"].values()) == 420
     succeed("bench", *options, "--out", "bench")
     content = read_report(Path("bench"))
-    assert ("--no-distinct" in content["command"]) == bool(bench_options)
     found, false, missed, _ = counts = content["rows"][0]["counts"].values()
     assert found > 0 < false
-    assert sum(counts) == points
+    assert sum(counts) == 300
     classes = report["classes"].values()
-    assert sum(each["points"] for each in classes) == points
+    assert sum(each["points"] for each in classes) == 300
     assert sum(each["called_rain"] for each in classes) == found + false
     snow = report["classes"]["falling-snow"]
     assert (snow["called_rain"], snow["points"]) == (found, found + missed)

@@ -1,4 +1,4 @@
-"""``derain fuse``: folders of two sensors become one, frame by frame, as their clocks say."""
+"""``derain fuse``: folders of two sensors become one, frame by frame, by their clocks."""
 
 import csv
 from collections.abc import Callable
@@ -8,16 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.files import read_scan
 from derain.files.extrinsics import Extrinsics
 from derain.files.labels import instance, read_labels, semantic, write_labels
 from derain.fusion import UNKNOWN
-from derain.simulation.campaign import Campaign
-from derain.simulation.radar import Radar
-from derain.simulation.sequence import write_sequence
-from derain.system.open3d_import import import_open3d
 
 PLACE = Extrinsics.of_pose(0.5, 0, -0.7, 0, 0, 90)
 COLUMNS = "x,y,z,doppler,rcs,range,azimuth,elevation,probability,class"
@@ -77,7 +72,7 @@ def test_each_scan_is_joined_by_the_radar_frame_nearest_in_time(run_fuse: Fuse) 
     assert not Path("out/lidar_radar_labels").exists()
 
 
-def test_the_metadata_say_what_was_joined_to_what(run_fuse: Fuse) -> None:
+def test_the_metadata_name_what_was_joined_to_what(run_fuse: Fuse) -> None:
     for sensor in ("lidar", "radar"):
         path = Path(sensor, "metadata.csv")
         path.write_text(path.read_text().replace("frame,timestamp", "stem,seconds"))
@@ -89,7 +84,7 @@ def test_the_metadata_say_what_was_joined_to_what(run_fuse: Fuse) -> None:
 
 
 @pytest.mark.parametrize("reach", [0.01, 1000])
-def test_labels_reach_as_far_as_is_said_and_instances_are_kept(
+def test_labels_reach_as_far_as_an_option_allows_and_instances_are_kept(
     run_fuse: Fuse, reach: float
 ) -> None:
     assert run_fuse("--labels", "labels", "--label-within", str(reach)).code == 0
@@ -114,30 +109,6 @@ def test_real_radar_detections_keep_their_doppler_and_rcs(run_fuse: Fuse, shared
     np.testing.assert_array_equal(fused.fields["rcs"][is_radar], detections[:, 4])
     back = Extrinsics(np.linalg.inv(PLACE.matrix))(fused.xyz[is_radar])
     np.testing.assert_allclose(back, detections[:, :3], atol=1e-4)
-
-
-def test_the_simulators_extended_radar_brings_its_velocity_and_cross_section(
-    succeed, tmp_path: Path
-) -> None:
-    try:
-        import_open3d()
-    except InputError as error:
-        pytest.skip(str(error))
-    write_sequence(tmp_path, Campaign(scans=1, sensor="mems_64", radar=Radar()), "000")
-    succeed(
-        *("fuse", "--lidar", tmp_path / "innoviz", "--radar", tmp_path / "ext_radar"),
-        *("--extrinsics", tmp_path / "extrinsics.yaml", "--out", tmp_path / "out"),
-        *("--extra", "velocity,cross_section", "--within", "0.1"),
-    )
-    (row,) = read_rows(tmp_path / "out/lidar_radar_pcd/metadata.csv")
-    detections = read_rows(tmp_path / f"ext_radar/{row['radar_frame']}.csv")
-    fused = read_scan(tmp_path / "out/lidar_radar_pcd/000000.npz")
-    is_radar = fused.fields["radar"] == 1
-    assert is_radar.sum() == len(detections) > 0
-    for name in ("velocity", "cross_section"):
-        expected = np.float32([float(detection[name]) for detection in detections])
-        np.testing.assert_array_equal(fused.fields[name][is_radar], expected)
-        assert np.isnan(fused.fields[name][~is_radar]).all()
 
 
 def put_on_another_clock() -> None:

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from derain.cards.card import load_card
 from derain.evaluation.hard_cases import scene
@@ -77,28 +76,17 @@ def test_a_card_without_labels_to_explain_is_warned_of(run_derain, tmp_path: Pat
     assert "falling-snow" in outcome.out
 
 
-def test_the_card_names_the_classes(facts_of, data_set: Path, tmp_path: Path) -> None:
+def test_the_card_is_named_or_else_chosen_by_the_layout(
+    facts_of, data_set: Path, tmp_path: Path
+) -> None:
     card = tmp_path / "mine.yaml"
     card.write_text("name: mine\nclasses: {3: wet, 7: grey}\nrain: [3]")
     facts = facts_of(data_set, "--card", card)
-    assert facts["card"] == "mine"
-    assert list(facts["class_share"]) == ["wet", "grey"]
-
-
-def test_the_layout_tells_the_card_unless_it_is_stated(facts_of, data_set: Path) -> None:
+    assert (facts["card"], list(facts["class_share"])) == ("mine", ["wet", "grey"])
     (data_set / "manifest.json").unlink()
     assert facts_of(data_set)["card"] == "REHEARSE-3D"
     facts = facts_of(data_set, "--layout", "lidar_radar_pcd,elsewhere")
     assert (facts["points"], facts["labelled_points"]) == (600, 0)
-
-
-@pytest.mark.parametrize("part", ["sequences", "sequences/000", "sequences/000/lidar_radar_pcd"])
-def test_a_part_of_a_simulated_set_is_known_as_simulated(
-    facts_of, data_set: Path, part: str
-) -> None:
-    facts = facts_of(data_set / part)
-    assert facts["card"] == "simulated rain"
-    assert some(facts["by_rain_rate"]["25"]["points_by_class"]) == {"rain": 20, "road": 180}
 
 
 def test_scans_without_labels_and_card_are_counted(succeed, facts_of, tmp_path: Path) -> None:
@@ -109,31 +97,10 @@ def test_scans_without_labels_and_card_are_counted(succeed, facts_of, tmp_path: 
     assert "no data card" in succeed("info", tmp_path).out
 
 
-def test_the_statistics_are_drawn(
-    succeed, data_set: Path, tmp_path: Path, saved_figures: list[Figure]
-) -> None:
-    succeed("info", data_set, "--picture", tmp_path / "statistics.png")
-    (figure,) = saved_figures
-    assert figure.get_suptitle() == "data: 6 scans, 600 points"
-    shares, points = figure.axes
-    assert [text.get_text() for text in shares.texts if text.get_text()] == [
-        *("clean: 33%", "25 mm/h: 33%", "rain unknown: 33%")
-    ]
-    bars = {bar.get_label(): bar.datavalues.tolist() for bar in points.containers}
-    assert bars == {"clean": [0, 200], "25 mm/h": [20, 180], "rain unknown": [20, 180]}
-
-
 def test_a_picture_shows_one_folder_alone(refused, data_set: Path, tmp_path: Path) -> None:
     for named in ([__file__], [data_set, data_set], ["--grid", data_set]):
         line = refused("info", *named, "--picture", tmp_path / "statistics.png")
         assert "--picture: shows one folder's statistics" in line
-
-
-def test_files_and_folders_can_be_named_together(run_derain, data_set: Path) -> None:
-    scan = data_set / "sequences/000/lidar_radar_pcd/000000.bin"
-    first, second = run_derain("info", data_set, scan, "--json").out.splitlines()
-    assert json.loads(first)["scans"] == 6
-    assert json.loads(second)["file"] == str(scan)
 
 
 @pytest.mark.parametrize(

@@ -56,7 +56,7 @@ def weights(model: Path) -> str:
 
 
 @pytest.mark.usefixtures("one_block")
-def test_a_recording_becomes_a_model_and_a_report_whatever_its_labels_say(
+def test_a_recording_becomes_a_model_and_a_report_whatever_its_labels(
     succeed, recording: Path
 ) -> None:
     lightning.seed_everything(0)
@@ -109,23 +109,11 @@ def shows_teacher_and_student(found: ReadBack, recording: Path, work: Path) -> N
     """The Rerun file holds the teacher's labels and the answers of the finished model."""
     teacher, student = found.points("/sensor/scan/teacher"), Derainer("model.onnx")
     removed = found.points("/sensor/methods/student/removed")
-    probability = found.points("/sensor/methods/student/probability")
-    assert list(teacher) == list(removed) == list(range(5))
     for number in range(5):
         scan = read_scan(recording / f"{number:06d}.bin")
         labels = read_labels(work / f"taught/labels/{number:06d}.label", 600)
         np.testing.assert_array_equal(teacher[number], scan.xyz[(labels != 0) & scan.valid])
         np.testing.assert_array_equal(removed[number], scan.xyz[student(scan)])
-        probable = student.probability(scan) >= 0.01
-        np.testing.assert_array_equal(probability[number], scan.xyz[probable])
-        shares = {
-            "/share/scan/teacher": labels == 1,
-            "/share/scan/teacher_not_known": labels == 255,
-            "/share/methods/student": student(scan),
-        }
-        for entity, part in shares.items():
-            share = 100 * (part & scan.valid).sum() / scan.valid.sum()
-            assert found.numbers(entity)[number] == pytest.approx(share)
     captions = found.values("/caption", "TextDocument:text")
     assert [number for number, text in captions.items() if ", held out" in text[0]] == [4]
 

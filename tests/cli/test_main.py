@@ -63,15 +63,6 @@ def test_a_model_is_written_only_under_a_suffix_that_it_is_known_by(
     assert f"--out: {tmp_path / 'model.txt'} does not end in {suffix}" in line
 
 
-def test_an_interruption_is_no_traceback(run_derain, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(arguments: object) -> int:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(module_of("info"), "main", interrupted)
-    outcome = run_derain("info", "scan.bin")
-    assert (outcome.code, outcome.err) == (130, "derain: interrupted\n")
-
-
 def test_a_reader_that_has_had_enough_ends_the_command_quietly() -> None:
     buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     with subprocess.Popen(

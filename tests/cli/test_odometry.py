@@ -92,7 +92,7 @@ def test_poses_by_time_are_those_of_the_scans_times(
 @pytest.mark.parametrize(
     ("times", "reason"),
     [
-        (None, "000000.bin: nothing says when it was taken"),
+        (None, "000000.bin: its time is not known"),
         ("5.0\n5.1\n5.1\n5.3\n", "000002.bin: was taken at 5.100 s, the scan before it at 5.100 s"),
         ("0\nsoon\n2\n3\n", "times.txt: line 2 is not 1 number"),
     ],

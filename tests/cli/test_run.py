@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export.runtime import Derainer
 from derain.files import read_scan, write_scan
-from derain.filters import DROR, DSOR, FILTERS, FilterDerainer, filter_from
+from derain.filters import DROR, DSOR, FilterDerainer
 from derain.scan import Scan
 from derain.sources.judgement import Judgement
-from derain.views.scan_issues import MOST_RAIN
 from derain.views.spherical_grid import SphericalGrid
 
 
@@ -84,22 +83,6 @@ def test_json_is_one_object_a_scan_and_nothing_else(
         assert list(item["milliseconds"]) == ["read", "view", "network", "back", "weather", "write"]
 
 
-def test_one_bad_scan_is_reported_and_the_rest_are_done(
-    run_derain, onnx_model: Path, scans: Path, tmp_path: Path
-) -> None:
-    bad = scans / "000002.bin"
-    bad.write_bytes(bad.read_bytes()[:-5])
-    outcome = run_derain("run", onnx_model, scans, "--out", tmp_path / "out", "--json")
-    assert outcome.code == 2
-    first, _, last = outcome.said
-    assert first.startswith(f"derain: {bad}: 3195 bytes are not whole rows of 16 bytes")
-    assert last == "derain: 1 of 3 scans could not be cleaned"
-    assert [json.loads(line)["points"] for line in outcome.out.splitlines()] == [100, 300]
-    assert names(tmp_path / "out") == [
-        f"{stem}.{suffix}" for stem in ("000001", "000003") for suffix in ("bin", "label")
-    ]
-
-
 def test_a_scan_for_which_the_memory_is_too_small_does_not_end_the_run(
     run_derain, scans: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -117,56 +100,22 @@ def test_a_scan_for_which_the_memory_is_too_small_does_not_end_the_run(
     assert {path.stem for path in (tmp_path / "out").glob("*.label")} == {"000001", "000002"}
 
 
-def test_a_data_set_is_cleaned_into_folders_like_its_own(succeed, tmp_path: Path) -> None:
-    root, out = tmp_path / "data", tmp_path / "out"
-    for name in ("02", "11"):
-        folder = root / "sequences" / name / "velodyne"
-        folder.mkdir(parents=True)
-        scene(300, int(name)).tofile(folder / "000000.bin")
-    outcome = succeed("run", "dror", root, "--out", out, "--json")
-    keys = [f"{name}/velodyne/000000" for name in ("02", "11")]
-    told = [json.loads(line)["scan"] for line in outcome.out.splitlines()]
-    assert told == [str(root / f"sequences/{key}.bin") for key in keys]
-    assert names(out) == [f"{key}.{suffix}" for key in keys for suffix in ("bin", "label")]
-
-
 @pytest.mark.parametrize(
     "command",
     [
         ["run", "ror", "{scans}", "--out", "out"],
         ["info", "{scans}"],
         ["view", "{scans}/000001.bin", "--methods", "ror", "--out", "out.png"],
-        ["annotate", "{scans}", "--scene", "scene.yaml", "--out", "out", "--no-picture"],
     ],
     ids=lambda command: command[0],
 )
-def test_damaged_records_break_no_command_that_asks_for_none(
+def test_damaged_records_break_no_command_that_needs_none(
     succeed, scans: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: list[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    Path("scene.yaml").write_text("road: [[2, -10], [60, -10], [60, 10], [2, 10]]")
     for record in ("poses.txt", "times.txt", "calib.txt", "scans/metadata.csv"):
         Path(record).write_bytes(b"\xff damaged")
     succeed(*(word.format(scans=scans) for word in command))
-
-
-def test_intensities_of_another_unit_are_warned_of_once_and_scaled_but_not_in_the_file(
-    succeed, onnx_model: Path, tmp_path: Path
-) -> None:
-    small = scene(300)
-    small[:, 3] /= 1024  # exact in binary, so that scaling gives the very same numbers back
-    for name in ("a", "b", "c"):
-        (tmp_path / "scans").mkdir(exist_ok=True)
-        small.tofile(tmp_path / f"scans/{name}.bin")
-    arguments = ["run", onnx_model, tmp_path / "scans", "--out", tmp_path / "out"]
-    warning, more = succeed(*arguments).said
-    assert warning.startswith(f"derain: warning: {tmp_path / 'scans/a.bin'}: mean intensity 0.0")
-    assert "see --intensity-scale" in warning
-    assert more == "derain: warning: 2 more scans: intensity of a smaller unit"
-    assert succeed(*arguments, "--intensity-scale", "1024").said == []
-    rain = rain_in(tmp_path / "out", "a")
-    np.testing.assert_array_equal(rain, Derainer(onnx_model)(scene(300)))
-    assert (tmp_path / "out/a.bin").read_bytes() == small[~rain].tobytes()
 
 
 def test_nothing_is_left_where_the_output_cannot_be_written(
@@ -201,6 +150,8 @@ def test_nothing_is_left_where_the_output_cannot_be_written(
         (["dror", "scans", "--probability"], "dror says which points are rain, and not how prob"),
         (["{model}", "scans", "--probability"], "000001.bin: the columns of such a file have no"),
         (["dror", "scans", "--topic", "/points"], "no bag is named"),
+        (["dror", "scans", "--warning", "40", "30"], "Give two numbers of metres, the second"),
+        (["dror", "scans", "--error", "35", "38"], "does not lie below the warning"),
     ],
 )
 def test_what_cannot_be_used_is_refused_before_any_work(
@@ -220,14 +171,6 @@ def test_what_cannot_be_used_is_refused_before_any_work(
     assert reason in refused("run", *words, *out)
     assert names(Path("scans")) == ["000001.bin", "000002.bin", "000003.bin"]
     assert not Path("out").exists()
-
-
-@pytest.mark.parametrize("name", FILTERS)
-def test_a_filter_labels_as_it_does_from_python(succeed, tmp_path: Path, name: str) -> None:
-    scene(400).tofile(tmp_path / "scan.bin")
-    succeed("run", name, tmp_path / "scan.bin", "--out", tmp_path / "out", "--threads", "2")
-    rain = FilterDerainer(filter_from(name, {}))(scene(400))
-    np.testing.assert_array_equal(rain_in(tmp_path / "out"), rain)
 
 
 def test_hard_scans_keep_every_row_that_is_not_rain(succeed, tmp_path: Path) -> None:
@@ -290,21 +233,6 @@ def test_columns_are_taken_as_stated_and_all_kept(
     assert (out / "scan.bin").read_bytes() == wide[~rain].tobytes()
 
 
-def test_an_organised_scan_is_labelled_cell_by_cell(
-    succeed, onnx_model: Path, tmp_path: Path
-) -> None:
-    points = scene(240)
-    points[::6] = np.nan  # cells without a return
-    source, out = tmp_path / "scan.pcd", tmp_path / "out"
-    write_scan(source, Scan(points[:, :3].copy(), points[:, 3].copy(), shape=(8, 30)))
-    succeed("run", onnx_model, source, "--out", out)
-    rain = rain_in(out)
-    np.testing.assert_array_equal(rain, Derainer(onnx_model)(points))
-    cleaned = read_scan(out / "scan.pcd")
-    np.testing.assert_array_equal(cleaned.xyz, points[~rain, :3])
-    assert cleaned.shape is None
-
-
 def write_named(path: Path) -> Scan:
     """A scan of 300 points with columns that have names; of LAS in whole millimetres."""
     points = scene(300)
@@ -358,7 +286,7 @@ def odd_scans(tmp_path: Path) -> Path:
     return folder
 
 
-def test_every_fault_is_told_with_its_first_file_and_counted(
+def test_every_fault_is_named_with_its_first_file_and_counted(
     succeed, odd_scans: Path, onnx_model: Path, tmp_path: Path
 ) -> None:
     outcome = succeed("run", onnx_model, odd_scans, "--out", tmp_path / "out", "--json")
@@ -375,26 +303,14 @@ def test_every_fault_is_told_with_its_first_file_and_counted(
     np.testing.assert_array_equal(*(rain_in(tmp_path / "out", name) for name in "bd"))
 
 
-def test_a_method_that_takes_nearly_all_says_so(succeed, odd_scans: Path, tmp_path: Path) -> None:
-    options = ["--set", "radius=1e-6", "--out", tmp_path / "out"]
-    outcome = succeed("run", "ror", odd_scans, *options)
-    first, more = outcome.err.splitlines()
-    assert first.startswith(
-        f"derain: warning: {odd_scans / 'a.bin'}: 100% of the points are called"
-    )
-    assert more == "derain: warning: 4 more scans: more than 35% called rain"
-    assert outcome.out.splitlines()[-1].endswith("; 5 scans with warnings")
-
-
-@pytest.mark.parametrize("options", [[], ["--most-removed", "0.99"]])
 def test_a_scan_that_would_lose_too_much_is_left_whole(
-    run_derain, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scans: Path, options: list[str]
+    run_derain, tmp_path: Path, scans: Path
 ) -> None:
-    monkeypatch.setattr("derain.cli.run.MOST_RAIN", MOST_RAIN)
     spread = scene(200) * np.array([1e3, 1e3, 1e3, 1], np.float32)
     spread.tofile(scans / "000002.bin")
     out = tmp_path / "out"
-    outcome = run_derain("run", "ror", scans, "--set", "radius=20", "--out", out, *options)
+    options = ("--set", "radius=20", "--most-removed", "0.99")
+    outcome = run_derain("run", "ror", scans, "--out", out, *options)
     assert outcome.code == 2
     refused, summary = outcome.err.splitlines()[-2:]
     assert refused.startswith(

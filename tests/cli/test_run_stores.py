@@ -82,15 +82,6 @@ def test_a_store_that_fails_gives_the_bytes_of_a_folder_and_a_second_run_does_no
     assert "3 of 3 units done" in succeed("status", "s3://drives/out").out
 
 
-def test_a_scan_that_is_changed_in_the_store_is_done_again(succeed, s3: Any, drive: Path) -> None:
-    s3.put(f"{drive}/", f"{BUCKET}/drive/", recursive=True)
-    command = ("run", "dror", "s3://drives/drive/", "--out", "s3://drives/out", *OPTIONS)
-    succeed(*command)
-    s3.put_file(str(drive / "000003.bin"), f"{BUCKET}/drive/000002.bin")
-    again = succeed(*command)
-    assert f"{SCANS} scans ({SCANS - 2} of them done before)" in again.out
-
-
 def test_processes_in_another_folder_do_what_is_in_a_store(
     s3: Any, drive: Path, tmp_path: Path
 ) -> None:
@@ -102,16 +93,6 @@ def test_processes_in_another_folder_do_what_is_in_a_store(
         report = derain.clean(source, method, out, most_removed=1, executor=executor)
     assert (len(report.scans), report.not_cleaned) == (SCANS, 0)
     assert len(in_store(s3, "out")) == 2 * SCANS
-
-
-def test_workers_read_a_store_and_write_to_a_folder(
-    succeed, s3: Any, drive: Path, tmp_path: Path
-) -> None:
-    s3.put(f"{drive}/", f"{BUCKET}/drive/", recursive=True)
-    for scans, out, workers in ((drive, "one", 1), ("s3://drives/drive", "two", 2)):
-        options = (*OPTIONS, "--workers", workers)
-        succeed("run", "persistence", scans, "--out", tmp_path / out, *options)
-    assert in_folder(tmp_path / "one") == in_folder(tmp_path / "two")
 
 
 @pytest.mark.parametrize("storage", ["mcap", "ros1"])

@@ -39,7 +39,9 @@ def test_a_run_of_more_scans_than_a_block_keeps_records_and_goes_on(
     assert table.read_text() == rows
 
 
-def test_a_run_of_few_scans_keeps_none_unless_asked(succeed, scans: Path, tmp_path: Path) -> None:
+def test_a_run_of_few_scans_keeps_none_without_an_option(
+    succeed, scans: Path, tmp_path: Path
+) -> None:
     out = tmp_path / "out"
     succeed("run", "dror", scans, "--out", out, "--most-removed", 1)
     assert not (out / ".derain").exists()
@@ -56,19 +58,6 @@ def test_other_options_are_refused_until_all_is_done_anew(
     for part in (str(out), "method was dror and is ror", "--anew"):
         assert part in line
     succeed("run", "ror", scans, "--out", out, *OPTIONS, "--anew")
-
-
-def test_workers_print_and_write_what_one_process_does(
-    succeed, scans: Path, tmp_path: Path
-) -> None:
-    one, two = (
-        succeed("run", "dror", scans, "--out", tmp_path / "out", *OPTIONS, *workers, "--json")
-        for workers in ((), ("--workers", 2, "--anew"))
-    )
-    facts = [[json.loads(line) for line in outcome.out.splitlines()] for outcome in (one, two)]
-    for fact in (*facts[0], *facts[1]):
-        del fact["milliseconds"]
-    assert facts[0] == facts[1]
 
 
 def test_shares_are_those_of_a_slurm_array_and_the_status_names_what_is_missing(

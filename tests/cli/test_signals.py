@@ -1,4 +1,4 @@
-"""A command that is asked to end clears up, and says by its exit code what ended it."""
+"""A signal ends a command, which clears up and whose exit code names the signal."""
 
 import signal
 import subprocess
@@ -7,9 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from derain.cli import info
-from derain.cli.main import main
-from derain.cli.signals import ENDING, Interruption, interrupting
+from derain.cli.signals import ENDING, interrupting
 from derain.files.atomic import replacing
 
 # `derain info` that writes its argument, slowly.
@@ -47,7 +45,7 @@ def stopped(path: Path, by: signal.Signals) -> tuple[int, str]:
 
 
 @pytest.mark.parametrize("by", ENDING, ids=lambda by: by.name)
-def test_a_command_that_is_asked_to_end_leaves_nothing_half_written(
+def test_a_command_that_a_signal_ends_leaves_nothing_half_written(
     tmp_path: Path, by: signal.Signals
 ) -> None:
     path = tmp_path / "result.bin"
@@ -56,19 +54,6 @@ def test_a_command_that_is_asked_to_end_leaves_nothing_half_written(
     assert stopped(path, by) == (128 + by, f"derain: interrupted{name}\n")
     assert list(tmp_path.iterdir()) == [path]
     assert path.read_bytes() == b"old"
-
-
-def test_a_signal_ends_a_command_in_which_a_class_is_being_made(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    class Attribute:
-        def __set_name__(self, owner: type, name: str) -> None:
-            raise Interruption(signal.SIGTERM)
-
-    # Before Python 3.12, the class raises a RuntimeError in its place.
-    monkeypatch.setattr(info, "main", lambda _: type("Owner", (), {"attribute": Attribute()}))
-    assert main(["info", "scan.bin"]) == 128 + signal.SIGTERM
-    assert capsys.readouterr().err == "derain: interrupted by SIGTERM\n"
 
 
 def test_what_a_killed_command_leaves_goes_with_the_next_and_what_is_in_use_stays(

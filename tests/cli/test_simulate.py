@@ -86,7 +86,7 @@ def test_shards_are_counted_by_the_status(
     assert json.loads(succeed("status", root, "--json").out)["done"] == 3
 
 
-def test_a_drive_goes_along_a_street_in_the_rain_asked_for_without_a_radar(
+def test_a_drive_goes_along_a_street_in_the_rain_of_its_options_without_a_radar(
     succeed, facts_of, tmp_path: Path
 ) -> None:
     root = tmp_path / "drive"
@@ -102,23 +102,12 @@ def test_a_drive_goes_along_a_street_in_the_rain_asked_for_without_a_radar(
     assert facts["class_share"]["car"] > 0.01
 
 
-def test_a_speed_of_0_and_no_traffic_is_what_it_is_without_them(succeed, tmp_path: Path) -> None:
-    options = [*QUICK, "--no-radar", "--layout", "street", "--sequences", "1"]
-    succeed("simulate", "--out", tmp_path / "plain", *options)
-    succeed("simulate", "--out", tmp_path / "zero", *options, "--speed", "0", "--traffic", "0")
-    for file in (file for file in (tmp_path / "plain/sequences").rglob("*") if file.is_file()):
-        same = tmp_path / "zero" / file.relative_to(tmp_path / "plain")
-        assert file.read_bytes() == same.read_bytes()
-
-
 def rained(folder: Path, stem: str, columns: int = 4) -> tuple[NDArray[np.float32], NDArray]:
     points = np.fromfile(folder / f"{stem}.bin", "<f4").reshape(-1, columns)
     return points, read_labels(folder / f"{stem}.label", len(points))
 
 
-def test_clean_scans_get_rain_and_labels_that_say_which_it_is(
-    succeed, clean: Path, tmp_path: Path
-) -> None:
+def test_clean_scans_get_rain_and_labels_of_it(succeed, clean: Path, tmp_path: Path) -> None:
     out = tmp_path / "rainy"
     outcome = succeed("simulate", "--on", clean, "--rain", "50", "--out", out, "--json")
     assert names(out) == ["000005.bin", "000005.label", "000006.bin", "000006.label"]
@@ -134,20 +123,17 @@ def test_clean_scans_get_rain_and_labels_that_say_which_it_is(
         assert set(map(bytes, points[label == 0, :3])) <= set(map(bytes, before))
 
 
-def test_a_line_says_what_the_rain_did_to_a_scan(succeed, clean: Path, tmp_path: Path) -> None:
-    scan = clean / "000005.bin"
-    outcome = succeed("simulate", "--on", scan, "--rain", "0", "--out", tmp_path / "rainy")
-    assert outcome.out == f"{scan}: 5,000 points, in the rain 5,000: 0 of drops, 0 lost\n"
-
-
-def test_a_seed_gives_the_same_rain_again_and_another_seed_other_rain(
-    succeed, clean: Path, tmp_path: Path
+def test_a_line_holds_what_the_rain_did_to_a_scan_and_a_bad_scan_is_reported(
+    run_derain, clean: Path, tmp_path: Path
 ) -> None:
-    def rain(seed: str) -> bytes:
-        succeed("simulate", "--on", clean, "--rain", "25", "--out", tmp_path / "o", "--seed", seed)
-        return (tmp_path / "o/000005.bin").read_bytes()
-
-    assert rain("1") == rain("1") != rain("2")
+    scan, bad = clean / "000005.bin", clean / "000004.bin"
+    bad.write_bytes(b"12345")
+    outcome = run_derain("simulate", "--on", bad, scan, "--rain", "0", "--out", tmp_path / "rainy")
+    assert outcome.code == 2
+    assert outcome.out == f"{scan}: 5,000 points, in the rain 5,000: 0 of drops, 0 lost\n"
+    first, last = outcome.err.splitlines()
+    assert first.startswith(f"derain: {bad}: 5 bytes are not whole rows of 16 bytes")
+    assert "1 of 2 scans" in last
 
 
 def test_columns_and_a_picture(succeed, tmp_path: Path, saved_figures: list[Figure]) -> None:
@@ -161,25 +147,6 @@ def test_columns_and_a_picture(succeed, tmp_path: Path, saved_figures: list[Figu
     assert label.any()
     (figure,) = saved_figures
     assert figure.get_suptitle() == "scan in 50 mm/h of simulated rain, and without its drops"
-
-
-def test_one_bad_scan_is_reported_and_the_rest_are_done(
-    run_derain, clean: Path, tmp_path: Path
-) -> None:
-    bad = clean / "000004.bin"
-    bad.write_bytes(b"12345")
-    outcome = run_derain("simulate", "--on", clean, "--rain", "25", "--out", tmp_path / "rainy")
-    assert outcome.code == 2
-    first, last = outcome.err.splitlines()
-    assert first.startswith(f"derain: {bad}: 5 bytes are not whole rows of 16 bytes")
-    assert last == "derain: it could not rain on 1 of 3 scans"
-    assert len(outcome.out.splitlines()) == 2
-
-
-def test_clean_scans_are_not_overwritten(refused, clean: Path) -> None:
-    before = {path: path.read_bytes() for path in clean.iterdir()}
-    assert "would overwrite" in refused("simulate", "--on", clean, "--rain", "25", "--out", clean)
-    assert {path: path.read_bytes() for path in clean.iterdir()} == before
 
 
 @pytest.mark.parametrize(

@@ -1,15 +1,19 @@
-"""``derain teach``: what it prints, what it warns of, and what is trained on what it wrote."""
+"""``derain teach``: its labels, what it prints and warns of, in one go, in units and in shards."""
 
 import json
+import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from window_method import Between
 
-from derain.annotation.manifest import Manifest
+from derain.annotation.manifest import CARD, LABELS, TAUGHT_MANIFEST, Manifest
+from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import read_labels, write_labels
+from derain.jobs.job import FOLDER
 from derain.recordings.recording_method import METHODS
 
 POINTS = 200
@@ -33,7 +37,7 @@ def drive(tmp_path: Path) -> Path:
     return folder
 
 
-def test_it_tells_of_every_scan_and_of_all(succeed, drive: Path, tmp_path: Path) -> None:
+def test_every_scan_is_printed_and_all_together(succeed, drive: Path, tmp_path: Path) -> None:
     out = tmp_path / "taught"
     outcome = succeed("teach", "between", drive, "--out", out, "--set", "rain_below=7")
     lines = outcome.out.splitlines()
@@ -74,7 +78,7 @@ def test_truth_is_measured_for_the_record_where_a_card_explains_it(
     assert len(Manifest.read(tmp_path / "out").scans) == 6
 
 
-def test_objects_are_printed_where_asked_for(run_derain, drive: Path, tmp_path: Path) -> None:
+def test_objects_are_printed_for_json(run_derain, drive: Path, tmp_path: Path) -> None:
     outcome = run_derain("teach", "dror", drive, "--out", tmp_path / "out", "--json")
     facts = [json.loads(line) for line in outcome.out.splitlines()]
     assert [Path(item["scan"]).stem for item in facts] == [f"{n:06d}" for n in range(6)]
@@ -99,7 +103,7 @@ def test_scans_that_cannot_be_read_are_passed_over(run_derain, drive: Path, tmp_
         (["--poses", "none.txt"], "none.txt"),
     ],
 )
-def test_what_is_wrong_is_told(
+def test_what_is_wrong_is_named(
     run_derain, drive: Path, tmp_path: Path, options: list[str], told: str
 ) -> None:
     outcome = run_derain("teach", "between", drive, "--out", tmp_path / "out", *options)
@@ -141,7 +145,7 @@ def test_points_that_are_not_known_stay(succeed, drive: Path, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("command", ["run", "teach"])
-def test_the_sensor_is_where_the_user_says(
+def test_the_sensor_is_where_the_option_places_it(
     run_derain, succeed, drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str
 ) -> None:
     made: list[Between] = []
@@ -167,13 +171,85 @@ def test_the_sensor_is_where_the_user_says(
     assert not (tmp_path / "no").exists()
 
 
-def test_recordings_that_number_their_scans_alike_are_told_apart(
+def command(drive: Path, out: Path, *options: object) -> tuple[object, ...]:
+    poses = ("--poses", "standing")
+    return ("teach", "persistence", drive, "--out", out, *poses, "--card", "wads", *options)
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and FOLDER not in path.parts
+    }
+
+
+def facts(printed: str) -> list[dict[str, Any]]:
+    """The objects of the scans, without times."""
+    found = [json.loads(line) for line in printed.splitlines()]
+    for each in found:
+        del each["milliseconds"]
+    return found
+
+
+def test_workers_write_and_count_what_one_process_does_without_records(
     succeed, drive: Path, tmp_path: Path
 ) -> None:
-    second = tmp_path / "again/velodyne"
-    second.mkdir(parents=True)
-    for number in range(3):
-        scene(POINTS, number).tofile(second / f"{number:06d}.bin")
-    succeed("teach", "between", drive, second, "--out", tmp_path / "out")
-    keys = {scan.key for scan in Manifest.read(tmp_path / "out").scans}
-    assert {"drive/velodyne/000001", "again/velodyne/000001"} <= keys
+    whole = succeed(*command(drive, tmp_path / "whole", "--json"))
+    units = succeed(*command(drive, tmp_path / "units", "--json", "--workers", 2, "--block", 3))
+    assert files(tmp_path / "units") == files(tmp_path / "whole")
+    assert facts(units.out) == facts(whole.out)
+    assert units.err == whole.err
+    assert not (tmp_path / "whole" / FOLDER).exists()
+
+
+def test_what_was_stopped_goes_on_with_the_same_figures(
+    succeed, drive: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    options = ("--block", 2)
+    first = succeed(*command(drive, out, *options, "--json"))
+    before = files(out)
+    kept = out / FOLDER / "labels/000000.label"
+    written = kept.stat().st_mtime_ns
+    (out / FOLDER / "units/000002.json").unlink()
+    (out / FOLDER / "labels/000005.label").unlink()
+    for name in (TAUGHT_MANIFEST, CARD):
+        (out / name).unlink()
+    shutil.rmtree(out / LABELS)
+    again = succeed(*command(drive, out, *options, "--json"))
+    assert files(out) == before
+    assert facts(again.out) == facts(first.out)
+    assert kept.stat().st_mtime_ns == written
+
+
+def test_shards_put_the_labels_in_place_when_the_last_is_done(
+    succeed, drive: Path, run_derain, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    succeed(*command(drive, tmp_path / "whole"))
+    for number in (2, 0):
+        outcome = succeed(*command(drive, out, "--block", 2, "--shard", f"{number}/3"))
+        assert f"derain status {out}" in outcome.out
+        with pytest.raises(InputError):
+            Manifest.read(out)
+    status = run_derain("status", out)
+    assert (status.code, status.out.splitlines()[-1]) == (2, "to be run again: --array=1")
+    succeed(*command(drive, out, "--block", 2, "--shard", "1/3"))
+    assert files(out) == files(tmp_path / "whole")
+    assert "3 of 3 units done" in succeed("status", out).out
+
+
+def test_scans_that_fail_are_left_out_of_a_whole_run_and_done_later(
+    succeed, run_derain, drive: Path, tmp_path: Path
+) -> None:
+    out, scan = tmp_path / "out", drive / "000003.bin"
+    content = scan.read_bytes()
+    scan.write_bytes(b"12345")
+    outcome = run_derain(*command(drive, out, "--block", 2))
+    assert outcome.code == 2
+    assert [each.number for each in Manifest.read(out).scans] == [0, 1, 2, 4, 5]
+    scan.write_bytes(content)
+    succeed(*command(drive, out, "--block", 2))
+    succeed(*command(drive, tmp_path / "whole"))
+    assert files(out) == files(tmp_path / "whole")

@@ -2,19 +2,16 @@
 
 import shlex
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
-import optuna
 import pytest
 import yaml
 
 from derain.export.bench.bench_entries import bench_entries
 from derain.export.methods import read_parameters
 from derain.export.runtime import Derainer
-from derain.export.storage import Storage
 from derain.files import read_scan
 from derain.files.labels import read_labels
 from derain.filters import FilterDerainer, filter_from
@@ -90,17 +87,6 @@ def test_the_threshold_of_a_model_is_tuned(succeed, onnx_model: Path) -> None:
     assert found == max(iou_of(probability > threshold) for threshold in (0, *probability))
 
 
-def test_points_outside_the_grid_of_a_model_are_warned_of(run_derain, salsanext_onnx: Path) -> None:
-    for path in files():
-        points = np.fromfile(path, np.float32).reshape(-1, 4)
-        points[:100, 2] = 80.0
-        points.tofile(path)
-    first, others = run_derain("tune", salsanext_onnx, *DATA, "--out", BEST).said
-    assert first.startswith("derain: warning: velodyne/0.bin: ")
-    assert "of the points lie outside the grid of WADS" in first
-    assert others == "derain: warning: 2 more scans: points outside the grid"
-
-
 def test_a_tuned_model_is_found_from_any_folder(
     succeed, here: Path, onnx_model: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -133,31 +119,6 @@ def test_a_model_that_is_not_beside_its_parameters_is_sought_as_written(onnx_mod
     assert read_parameters(BEST)[0] == "dsor"
 
 
-def test_intensities_of_another_unit_are_warned_of_and_scaled(run_derain) -> None:
-    options = ["tune", "ssr", *DATA, "--trials", "12", "--out", BEST]
-    whole = run_derain(*options)
-    assert whole.said == []
-    for path in files():
-        points = np.fromfile(path, np.float32).reshape(-1, 4)
-        (points / np.array([1, 1, 1, 256], np.float32)).tofile(path)
-    small = run_derain(*options)
-    first, others = small.said
-    assert first.startswith("derain: warning: velodyne/0.bin: intensities of 0..1, but 0..255 for")
-    assert others == "derain: warning: 2 more scans: intensity of a smaller unit"
-    scaled = run_derain(*options, "--intensity-scale", "256")
-    assert scaled.said == []
-    assert scaled.out == whole.out != small.out
-
-
-def test_a_second_call_goes_on_with_the_study_of_the_same_scans(succeed, refused) -> None:
-    options = ["tune", "ror", *DATA, "--storage", "study.db"]
-    for trials in ("3", "6", "6"):
-        succeed(*options, "--trials", trials, "--out", BEST)
-    line = refused(*options, "--scans", "1", "--out", "no.yaml")
-    assert "holds a study of ror on other scans, labels or candidates" in line
-    assert not Path("no.yaml").exists()
-
-
 def test_the_scans_are_drawn_by_the_seed(succeed) -> None:
     def tuned(seed: int) -> str:
         options = ["--scans", "1", "--trials", "1", "--seed", str(seed)]
@@ -166,12 +127,6 @@ def test_the_scans_are_drawn_by_the_seed(succeed) -> None:
 
     assert tuned(1) == tuned(1)
     assert len({tuned(seed) for seed in range(1, 5)}) > 1
-
-
-def test_a_slip_of_the_pen_is_known(refused) -> None:
-    assert "dzor: no such method or file. Did you mean dsor?" in refused(
-        "tune", "dzor", *DATA, "--out", BEST
-    )
 
 
 def test_scans_without_rain_are_refused(refused, write_labelled) -> None:
@@ -198,33 +153,6 @@ def test_what_cannot_be_written_is_refused_before_any_work(refused) -> None:
 
 
 COMMAND = [sys.executable, "-c", "import sys; from derain.cli.main import main; sys.exit(main())"]
-
-
-def tune_at_once(processes: int, *options: str) -> list[tuple[int, str]]:
-    """Runs so many commands at the same time; returns their exit codes and what they printed."""
-    tune = [*COMMAND, "tune", "dsor", *DATA, *options]
-    started = [
-        subprocess.Popen(
-            [*tune, "--out", f"{number}.yaml"],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-        for number in range(processes)
-    ]
-    printed = [process.communicate(timeout=300)[0] for process in started]
-    return [(process.returncode, text) for process, text in zip(started, printed, strict=True)]
-
-
-@pytest.mark.parametrize("storage", ["study.journal", "study.db"])
-def test_processes_share_the_trials_of_a_storage(storage: str) -> None:
-    (one, printed), other = tune_at_once(2, "--trials", "30", "--storage", storage)
-    assert one == 0, printed
-    assert other == (0, printed)
-    trials = optuna.load_study(study_name="dsor", storage=Storage(storage).open()).trials
-    complete = [trial for trial in trials if trial.state == optuna.trial.TrialState.COMPLETE]
-    assert len(complete) == 30
-    assert read_parameters(Path("0.yaml")) == read_parameters(Path("1.yaml"))
 
 
 @pytest.mark.parametrize(

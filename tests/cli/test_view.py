@@ -66,33 +66,6 @@ def test_methods_are_drawn_with_and_without_truth(
     assert truth.get_suptitle() == bare.get_suptitle() == "7.bin: 300 points"
 
 
-def test_intensities_of_another_unit_are_warned_of_and_scaled(
-    run_derain, scan: Path, tmp_path: Path, onnx_model: Path, saved: list[Figure]
-) -> None:
-    arguments = ["--methods", f"net={onnx_model}", "ssr", "--out", tmp_path / "out.png"]
-    assert run_derain("view", scan, *arguments).said == []
-    points = np.fromfile(scan, np.float32).reshape(-1, 4)
-    (points / np.array([1, 1, 1, 256], np.float32)).tofile(scan)
-    net, ssr = run_derain("view", scan, *arguments).said
-    assert net.startswith(f"derain: warning: {scan}: net: mean intensity 0.")
-    assert ssr.startswith(f"derain: warning: {scan}: ssr: intensities of 0..1, but 0..255")
-    assert run_derain("view", scan, *arguments, "--intensity-scale", "256").said == []
-    whole, small, scaled = saved
-    assert panels(scaled) == panels(whole) != panels(small)
-
-
-def test_points_outside_the_grid_of_a_model_are_warned_of(
-    run_derain, tmp_path: Path, salsanext_onnx: Path, saved: list[Figure]
-) -> None:
-    points = scene(400)
-    points[:100, 2] = 80.0
-    points.tofile(tmp_path / "high.bin")
-    methods = ["--methods", f"net={salsanext_onnx}", "--out", tmp_path / "out.png"]
-    (warning,) = run_derain("view", tmp_path / "high.bin", *methods).said
-    assert "high.bin: net: " in warning
-    assert "of the points lie outside the grid of WADS" in warning
-
-
 def test_nothing_to_do_is_refused(refused, scan: Path) -> None:
     assert "Give --out, --window or --rerun." in refused("view", scan, "--methods", "dror")
 

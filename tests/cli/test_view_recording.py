@@ -31,7 +31,7 @@ def recording(tmp_path: Path) -> Path:
     return folder
 
 
-def test_what_is_kept_and_removed_is_what_run_says(
+def test_what_is_kept_and_removed_is_what_run_finds(
     succeed, recording: Path, tmp_path: Path, onnx_model: Path
 ) -> None:
     out = tmp_path / "out.rrd"
@@ -62,7 +62,7 @@ def test_what_is_kept_and_removed_is_what_run_says(
     for number, shown in found.points("/sensor/methods/net/probability").items():
         probable = Derainer(onnx_model).probability(scans[number]) >= 0.01
         np.testing.assert_array_equal(shown, scans[number].xyz[probable])
-    # A filter says yes or no: there is nothing to shade.
+    # A filter answers yes or no: there is nothing to shade.
     assert not found.points("/sensor/methods/dror/probability")
 
 
@@ -150,7 +150,7 @@ def test_scans_lie_where_and_when_they_were_taken(succeed, recording: Path, tmp_
     assert found.timelines == {"frame", "time"}
 
 
-def test_a_scan_that_cannot_be_read_is_told_of_once_and_shown_empty(
+def test_a_scan_that_cannot_be_read_is_reported_once_and_shown_empty(
     run_derain, recording: Path, tmp_path: Path
 ) -> None:
     (recording / "002.bin").write_bytes(b"no scan")
@@ -191,7 +191,7 @@ def test_what_cannot_be_meant_is_refused_and_nothing_is_written(
     assert [file.name for file in tmp_path.iterdir()] == ["drive"]
 
 
-def test_without_rerun_it_is_said_what_installs_it(
+def test_without_rerun_the_extra_is_named(
     refused, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "rerun", None)

@@ -77,31 +77,24 @@ def test_cells_of_unknown_points_are_not_to_be_judged(view: View) -> None:
 
 
 @views
-def test_a_batch_that_is_measured_carries_the_scans_and_one_that_is_not_tensors_alone(
-    view: View,
-) -> None:
+@pytest.mark.parametrize("measured", [True, False])
+def test_only_a_batch_that_is_measured_carries_its_scans(view: View, measured: bool) -> None:
     scans = [Scan.of(scene(size, seed=size)) for size in (200, 0, 90)]
     seen = [view(scan) for scan in scans]
-
-    def batch(measured: bool) -> Batch:
-        pairs = zip(scans, seen, strict=True)
-        return Batch.of([Sample(scan, viewed, None, measured) for scan, viewed in pairs])
-
-    told, untold = batch(measured=True), batch(measured=False)
-    sent: Batch = pickle.loads(pickle.dumps(told))
-    scores = sent.split(torch.rand(sum(told.cells)))
-    for scan, viewed, score, measured in zip(scans, seen, scores, sent.measured, strict=True):
-        np.testing.assert_array_equal(measured.scan.xyz, scan.xyz)
+    pairs = zip(scans, seen, strict=True)
+    batch = Batch.of([Sample(scan, viewed, None, measured) for scan, viewed in pairs])
+    sent: Batch = pickle.loads(pickle.dumps(batch))
+    scores = sent.split(torch.rand(sum(batch.cells)))
+    assert len(sent.measured) == measured * len(scans)
+    for scan, viewed, score, carried in zip(scans, seen, scores, sent.measured, strict=False):
+        np.testing.assert_array_equal(carried.scan.xyz, scan.xyz)
         np.testing.assert_array_equal(
-            measured.back_projection(score.numpy()), viewed.back(score.numpy())
+            carried.back_projection(score.numpy()), viewed.back(score.numpy())
         )
-    assert not untold.measured
-    assert untold.cells == told.cells
-    tensors = sum(tensor.nbytes for tensor in untold.inputs.values())
-    assert len(pickle.dumps(untold)) < tensors + 2000  # names, shapes and types
     # Of a point its coordinates, intensity, range and pixel; of a pixel what it shows.
     most = sum(44 * len(scan) + 4 * viewed.size for scan, viewed in zip(scans, seen, strict=True))
-    assert len(pickle.dumps(told)) < tensors + most + 5000
+    tensors = sum(tensor.nbytes for tensor in batch.inputs.values())
+    assert len(pickle.dumps(batch)) < tensors + measured * most + 5000  # names, shapes and types
 
 
 def test_tensors_follow_to_another_device_and_scans_stay() -> None:

@@ -127,13 +127,13 @@ def test_autocast_changes_nothing() -> None:
     assert [part.item() for part in under_autocast] == [part.item() for part in expected]
 
 
-@given(seeds, st.integers(0, 40), st.sampled_from([(2, 1), (2, 2), (3, 3)]))
-def test_the_loss_is_the_sum_of_the_two_also_by_the_short_way_of_two_classes(
-    seed: int, points: int, case: tuple[int, int]
+@given(seeds, st.integers(0, 40), st.sampled_from([1, 2]), st.booleans())
+def test_the_loss_is_the_sum_of_the_two(
+    seed: int, points: int, present: int, swapped: bool
 ) -> None:
-    classes, present = case
-    logits, target = random_case(seed, points, classes=classes, present=present)
-    weight = torch.tensor([1.07, 14.84, 3.0])[:classes]
+    logits, target = random_case(seed, points, classes=2, present=present)
+    target = 1 - target if swapped else target
+    weight = torch.tensor([1.07, 14.84])
     short = segmentation_loss(logits.requires_grad_(), target, weight)
     cross_entropy = weighted_cross_entropy(logits, target, weight)
     lovasz = lovasz_softmax(logits.softmax(dim=1), target)
@@ -143,23 +143,8 @@ def test_the_loss_is_the_sum_of_the_two_also_by_the_short_way_of_two_classes(
     torch.testing.assert_close(torch.autograd.grad(short.total, logits), expected)
 
 
-@pytest.mark.parametrize(
-    ("points", "published"),
-    [
-        # Points by class in 3D-OutDet's configurations, and the weights it makes of them.
-        ((117_368_406, 15_966_358), (1.135, 8.282)),  # WADS
-        ((0.9, 0.1), (1.110, 9.901)),  # SnowyKITTI
-        ((196_553_910 + 1_618_805, 2_435_157), (1.011, 76.1)),  # SemanticSpray
-        ((0.93361355634800304, 0.06638644365199696), (1.070, 14.840)),  # REHEARSE-3D
-        ((1, 0), (1 / 1.001, 1000)),  # finite
-    ],
-    ids=["WADS", "SnowyKITTI", "SemanticSpray", "REHEARSE-3D", "without rain"],
-)
-def test_class_weights_are_the_published_ones(
-    points: tuple[float, float], published: tuple[float, float]
-) -> None:
-    weights = class_weights([count / sum(points) for count in points])
-    assert weights.tolist() == pytest.approx(published, rel=5e-4)
+def test_the_weight_of_a_class_that_never_occurs_is_finite() -> None:
+    assert class_weights([1, 0]).tolist() == pytest.approx([1 / 1.001, 1000])
 
 
 @pytest.mark.parametrize("share", [-0.1, 1.1, float("nan")])

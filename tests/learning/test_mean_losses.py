@@ -37,7 +37,7 @@ def test_each_batch_weighs_its_scans_and_the_order_does_not_matter(
     assert means(batches) == found
 
 
-def test_a_batch_of_which_no_scan_counts_tells_the_names_and_nothing_else() -> None:
+def test_a_batch_of_which_no_scan_counts_gives_the_names_and_nothing_else() -> None:
     counted = [(1.0, 0.25, 3), (3.0, 0.5, 1)]
     assert means([(float("nan"), float("inf"), 0), *counted]) == {"loss": 1.5, "part": 0.3125}
     assert list(means([(7.0, 7.0, 0)])) == ["loss", "part"]

@@ -1,4 +1,4 @@
-"""What a model and its data agree on: each is asked for what it knows, once."""
+"""What a model and its data agree on: each gives what it knows, once."""
 
 from dataclasses import replace
 from typing import Any

@@ -13,8 +13,17 @@ from derain.files import read_scan
 from derain.files.labels import read_labels
 from derain.scan import Scan
 from derain.views.returns import pair_returns
-from derain.weather.alike import FEWEST_SAMPLED, MULTIPLIER, ONE_IN, repetitions, seem_distinct
-from derain.weather.rays import BIN, RANGE_BINS, RAY_SECTORS, ray_ends
+from derain.weather.rays import (
+    BIN,
+    FEWEST_SAMPLED,
+    MULTIPLIER,
+    ONE_IN,
+    RANGE_BINS,
+    RAY_SECTORS,
+    ray_ends,
+    repetitions,
+    seem_distinct,
+)
 
 # A return: number of its ray, range in metres, and whether it is rain.
 Return = tuple[int, float, bool]
@@ -95,7 +104,7 @@ def test_what_cannot_be_judged_and_what_a_radar_saw_is_of_no_ray() -> None:
     assert np.argwhere(ends).tolist() == [[0, 0, 10]]
 
 
-def test_of_real_scans_as_many_rays_are_told_as_by_their_pairs_of_returns(shared: Path) -> None:
+def test_of_real_scans_as_many_rays_are_found_as_by_their_pairs_of_returns(shared: Path) -> None:
     # One of single returns, without its copies; one of two returns as the sensor wrote it.
     for scan_file, label_file in (
         ("clean/kitti_front.bin", None),
@@ -121,7 +130,7 @@ def test_each_number_is_left_once_and_the_others_repeat_it(values: list[int]) ->
     assert not set(repeating) & set(repeated)
 
 
-def test_numbers_of_one_slot_are_told_apart() -> None:
+def test_numbers_of_one_slot_are_kept_apart() -> None:
     # What the multiplier makes 0, 1, 2 and so on of, so that all upper bits are 0.
     inverse = pow(MULTIPLIER, -1, 2**32)
     numbers = np.array([place * inverse % 2**32 for place in range(2000)] * 2, np.uint32)
@@ -137,4 +146,4 @@ def test_a_sample_shows_whether_many_numbers_repeat_others() -> None:
     assert seem_distinct(many)
     again = generator.choice(many, len(many) // 100)
     assert not seem_distinct(np.concatenate([many, again]))
-    assert not seem_distinct(many[: FEWEST_SAMPLED * ONE_IN // 2])  # too few to say so
+    assert not seem_distinct(many[: FEWEST_SAMPLED * ONE_IN // 2])  # too few to know

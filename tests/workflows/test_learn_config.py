@@ -55,7 +55,7 @@ def test_a_network_is_trained_by_its_configuration_without_intensity_where_it_is
 
 
 @pytest.mark.parametrize("columns", [3, 4])
-def test_it_begins_with_the_model_of_derain_unless_another_is_asked_for(
+def test_it_begins_with_the_model_of_derain_unless_another_is_named(
     tmp_path: Path, columns: int
 ) -> None:
     scans = write_scans(tmp_path / "scans", columns)

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.random import Generator
 
 from derain.errors import InputError
-from derain.files.documents import Entry
-from derain.files.packaged import packaged
+from derain.files.documents import Entry, packaged
 from derain.simulation.drawing import Span, pick
 from derain.simulation.settings import Positive, Settings, Share
 

@@ -24,7 +24,7 @@ FIT = ("fit", "--config", "outdet_simulated.yaml")
         ("--data.loading.batch_size", "0", "batch_size"),
         ("--seed_everything", "-1", "--seed_everything: "),
         ("--trainer.strategy", "foo", "strategy"),
-        ("--panels.pictures", "-1", "--panels.pictures: -1 is too few"),
+        ("--panels.pictures", "-1", "--panels.pictures: "),
         ("--trainer.max_epochs", "-3", "--trainer: `max_epochs` must be"),
     ],
 )

@@ -29,7 +29,7 @@ def test_every_option_of_the_short_help_is_in_the_long_one(run_derain, succeed) 
     assert {"trainer.precision", "checkpoint.monitor", "panels.scans"} <= listed - named
 
 
-def test_the_options_of_a_class_are_told_without_a_configuration(succeed) -> None:
+def test_the_options_of_a_class_are_listed_without_a_configuration(succeed) -> None:
     outcome = succeed("fit", "--data.help", "Wads")
     assert "Folder of the data set" in outcome.out
 

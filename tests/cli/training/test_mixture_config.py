@@ -5,7 +5,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from derain.cards.card import load_card
 from derain.models.checkpoint import load_model
@@ -53,27 +52,3 @@ def test_the_packaged_mixture_goes_from_training_to_predictions(
         "streets",
     ]
     assert all(len(np.fromfile(path, "<u4")) == 300 for path in written)
-
-
-@pytest.mark.parametrize(
-    ("option", "value", "said"),
-    [
-        ("weights.dale", "2", "'dale': there is none"),
-        ("weights.hill", "0", "'hill': its weight is"),
-    ],
-)
-def test_parts_that_do_not_fit_together_are_told_in_a_line(
-    last_line, option: str, value: str, said: str
-) -> None:
-    Path("own.yaml").write_text(
-        """
-        model: {class_path: OutDet}
-        data:
-          class_path: Mixture
-          init_args:
-            parts:
-              hill: {class_path: Folder, init_args: {root: ., card: wads, train: [hill/*.bin]}}
-              vale: {class_path: Folder, init_args: {root: ., card: wads, train: [vale/*.bin]}}
-        """
-    )
-    assert said in last_line("fit", "--config", "own.yaml", f"--data.{option}", value)

@@ -1,13 +1,54 @@
-"""How far a training is, how good, and how long it still takes."""
+"""How far a long work is: its steps, and the epochs of a training, with their times."""
 
 import math
 import sys
 import time
+from collections.abc import Callable
 
 from lightning import LightningModule, Trainer
 from lightning.pytorch.callbacks import Callback
 
-from derain.workflows.steps import clock
+# Receives the lines to show.
+Show = Callable[[str], None]
+
+
+def show_nothing(text: str) -> None:
+    """Drops the lines."""
+
+
+class Steps:
+    """Shows steps and their results.
+
+    Args:
+        show: Receives each line.
+        total: Number of all steps.
+    """
+
+    def __init__(self, show: Show, total: int) -> None:
+        self.show = show
+        self._total = total
+        self._begun = 0
+        self._start = self._step = time.monotonic()
+
+    def begin(self, title: str) -> None:
+        """Shows what the next step does, and how many steps there are."""
+        self._begun += 1
+        self.show(f"{title} (step {self._begun} of {self._total})")
+        self._step = time.monotonic()
+
+    def end(self, result: str) -> None:
+        """Shows the result of the step, and its time."""
+        self.show(f"  {clock(time.monotonic() - self._step)}  {result}")
+
+    @property
+    def elapsed(self) -> str:
+        """Time since the first step, as minutes and seconds."""
+        return clock(time.monotonic() - self._start)
+
+
+def clock(seconds: float) -> str:
+    """A time as minutes and seconds."""
+    return f"{int(seconds) // 60}:{int(seconds) % 60:02d}"
 
 
 class EpochLines(Callback):

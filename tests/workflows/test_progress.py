@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from derain.workflows.training_progress import EpochLines
+from derain.workflows.progress import EpochLines
 
 
 @pytest.fixture
