@@ -31,8 +31,7 @@ from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.processes import DERAIN
-
+from benchmarks.installed import DERAIN
 from derain.evaluation.text_tables import markdown_table
 
 ADDRESS = "tcp://127.0.0.1:8797"

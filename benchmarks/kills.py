@@ -31,9 +31,9 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from benchmarks.processes import DERAIN
 from tqdm import tqdm
 
+from benchmarks.installed import DERAIN
 from benchmarks.small_inputs import COMMANDS, SmallInputs
 from benchmarks.whole_files import fault_of
 from derain.cli.signals import interrupting

@@ -21,9 +21,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from benchmarks.processes import DERAIN
 from numpy.typing import NDArray
 
+from benchmarks.installed import DERAIN
 from derain.cards.card import load_card
 from derain.datamodules.worlds import Worlds
 from derain.errors import InputError

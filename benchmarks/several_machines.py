@@ -31,8 +31,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import torch
-from benchmarks.processes import DERAIN
 
+from benchmarks.installed import DERAIN
 from derain.evaluation.text_tables import markdown_table
 from derain.export.timing import versions
 

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from benchmarks.processes import DERAIN
+
+from benchmarks.installed import DERAIN
 
 # Folder of the data sets; no variant's is called so.
 DATA_SETS = "data-sets"
