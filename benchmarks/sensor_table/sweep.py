@@ -11,7 +11,7 @@ from typing import Any
 
 import yaml
 
-from benchmarks.installed import DERAIN
+from benchmarks.processes import DERAIN
 
 # Folder of the data sets; no variant's is called so.
 DATA_SETS = "data-sets"
