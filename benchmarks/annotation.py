@@ -22,6 +22,7 @@ from derain.annotation.picture import annotation_figure
 from derain.annotation.scene import Correction, Scene, inside
 from derain.annotation.steps import Plane, annotate, road_plane
 from derain.evaluation.counts import intersection_over_union
+from derain.evaluation.text_tables import markdown_table
 from derain.fusion import UNKNOWN
 from derain.pictures.scan_pictures import save
 from derain.scan import Scan
@@ -124,43 +125,38 @@ def _variants(scene: Scene) -> dict[str, Scene]:
     return others
 
 
-def _row(*cells: object) -> str:
-    return f"| {' | '.join(map(str, cells))} |"
-
-
 def _print_tables(
     by_rate: dict[tuple[str, float], Findings],
     by_scene: dict[str, Findings],
     by_variant: dict[str, Findings],
 ) -> None:
     names = [kind.name.lower() for kind in TrackClass]
-    print(_row("drops are sought over", "rain mm/h", "points", "agreement", "rain IoU"))
-    print(_row("---", *["---:"] * 4))
+    body = []
     for (name, rate), found in by_rate.items():
         points, iou = f"{found.table.sum():,}", f"{found.iou[TrackClass.RAIN]:.4f}"
-        print(_row(name, f"{rate:g}", points, f"{found.agreement:.3%}", iou if rate else "-"))
+        body.append([name, f"{rate:g}", points, f"{found.agreement:.3%}", iou if rate else "-"])
+    head = ["drops are sought over", "rain mm/h", "points", "agreement", "rain IoU"]
+    print(markdown_table(head, body))
 
-    print("\n" + _row("IoU by class", *names))
-    print(_row("---", *["---:"] * KINDS))
-    for name, found in by_scene.items():
-        print(_row(name, *(f"{iou:.4f}" for iou in found.iou)))
+    body = [[name, *(f"{iou:.4f}" for iou in found.iou)] for name, found in by_scene.items()]
+    print("\n" + markdown_table(["IoU by class", *names], body))
 
     name, found = list(by_scene.items())[-1]
-    print("\n" + _row(f"{name}: truth \\ label", *names))
-    print(_row("---", *["---:"] * KINDS))
-    for kind, counts in zip(names, found.table, strict=True):
-        print(_row(kind, *(f"{count:,}" for count in counts)))
+    counts = found.table.tolist()
+    body = [[kind, *map("{:,}".format, row)] for kind, row in zip(names, counts, strict=True)]
+    print("\n" + markdown_table([f"{name}: truth \\ label", *names], body))
 
-    print("\n" + _row("wrong labels, share of all points", *by_scene))
-    print(_row("---", *["---:"] * len(by_scene)))
+    body = []
     for reason in found.reasons:
         shares = (each.reasons[reason] / each.table.sum() for each in by_scene.values())
-        print(_row(reason, *(f"{share:.4%}" for share in shares)))
+        body.append([reason, *(f"{share:.4%}" for share in shares)])
+    print("\n" + markdown_table(["wrong labels, share of all points", *by_scene], body))
 
-    print("\n" + _row(name, "agreement", "rain IoU"))
-    print(_row("---", "---:", "---:"))
-    for variant, found in by_variant.items():
-        print(_row(variant, f"{found.agreement:.3%}", f"{found.iou[TrackClass.RAIN]:.4f}"))
+    body = [
+        [variant, f"{found.agreement:.3%}", f"{found.iou[TrackClass.RAIN]:.4f}"]
+        for variant, found in by_variant.items()
+    ]
+    print("\n" + markdown_table([name, "agreement", "rain IoU"], body))
 
 
 def main() -> None:

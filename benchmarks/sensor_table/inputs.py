@@ -70,8 +70,8 @@ def _bench_entry(title: str, row: Row, shared: Path, exported: Path) -> BenchEnt
         given = _published(row, shared, exported)
     elif row.set:
         given = load_method_of_one_scan(row.method, row.set)
-    (row,) = bench_entries({title: given})
-    return row
+    (entry,) = bench_entries({title: given})
+    return entry
 
 
 def _published(row: Row, shared: Path, exported: Path) -> Path:
