@@ -209,6 +209,13 @@ def test_faces_that_cannot_follow_are_left_out_and_said_to_be(
     np.testing.assert_array_equal(read_scan(path).xyz, POINTS)
 
 
+def test_faces_of_another_cloud_are_not_written(file: Path) -> None:
+    file.write_bytes(mesh(TRIANGLES, "ascii"))
+    of_mesh = read_scan(file)
+    write_scan(file, Scan(of_mesh.xyz[:2], header=of_mesh.header))
+    assert b"face" not in file.read_bytes()
+
+
 def test_other_elements_are_said_to_be_left_out(tmp_path: Path) -> None:
     path = tmp_path / "mesh.ply"
     path.write_bytes(mesh(TRIANGLES, "ascii", "element edge 1\nproperty int vertex1") + b"3\n")
