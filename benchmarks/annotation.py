@@ -1,7 +1,7 @@
 """Labels by geometry against the truth that the simulator knows: how well, and where they err.
 
     python -m benchmarks.annotation
-    python -m benchmarks.annotation --tracks 5 --scans 3 --picture annotation.png
+    python -m benchmarks.annotation --tracks 5 --scans 3
 
 Each track is a simulated facility in which it rains at four rates, described once as the paper
 does, with drops over the road alone, and once with the ground beside it that the sprinklers wet.
@@ -11,20 +11,17 @@ import argparse
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
 from benchmarks.track_scene import scene_of_track
-from derain.annotation.picture import annotation_figure
 from derain.annotation.scene import Correction, Scene, inside
 from derain.annotation.steps import Plane, annotate, road_plane
 from derain.evaluation.counts import intersection_over_union
 from derain.evaluation.text_tables import markdown_table
 from derain.fusion import UNKNOWN
-from derain.pictures.scan_pictures import save
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass
 from derain.simulation.facility import lay_out_facility
@@ -166,7 +163,6 @@ def main() -> None:
     )
     parser.add_argument("--tracks", type=int, default=3, help="tracks, each at four rain rates")
     parser.add_argument("--scans", type=int, default=2, help="scans of each")
-    parser.add_argument("--picture", type=Path, help="PNG of the last scan's labels")
     arguments = parser.parse_args()
 
     by_rate: dict[tuple[str, float], Findings] = defaultdict(Findings)
@@ -182,9 +178,6 @@ def main() -> None:
             for scan in scans:
                 by_variant[name].add(scan, variant, plane)
     _print_tables(dict(sorted(by_rate.items())), by_scene, by_variant)
-    if arguments.picture:
-        title = f"Simulated rain, {rate:g} mm/h, labelled by geometry"
-        save(annotation_figure(scan, annotate(scan, scene, plane), scene, title), arguments.picture)
 
 
 if __name__ == "__main__":
