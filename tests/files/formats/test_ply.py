@@ -177,6 +177,13 @@ def test_faces_of_vertices_that_stay_are_renumbered(
     assert read_scan(path).header.faces.table["red"].tolist() == [1, 2]
 
 
+def test_faces_of_another_cloud_are_not_written(file: Path) -> None:
+    file.write_bytes(mesh(TRIANGLES, "ascii"))
+    of_mesh = read_scan(file)
+    write_scan(file, Scan(of_mesh.xyz[:2], header=of_mesh.header))
+    assert b"face" not in file.read_bytes()
+
+
 def test_faces_follow_vertices_in_any_order_and_the_first_of_those_taken_twice(
     tmp_path: Path,
 ) -> None:
@@ -207,13 +214,6 @@ def test_faces_that_cannot_follow_are_left_out_and_said_to_be(
     write_scan(path, read_scan(path))
     assert b"face" not in path.read_bytes()
     np.testing.assert_array_equal(read_scan(path).xyz, POINTS)
-
-
-def test_faces_of_another_cloud_are_not_written(file: Path) -> None:
-    file.write_bytes(mesh(TRIANGLES, "ascii"))
-    of_mesh = read_scan(file)
-    write_scan(file, Scan(of_mesh.xyz[:2], header=of_mesh.header))
-    assert b"face" not in file.read_bytes()
 
 
 def test_other_elements_are_said_to_be_left_out(tmp_path: Path) -> None:
