@@ -13,7 +13,7 @@ import argparse
 from pathlib import Path
 
 from benchmarks.sensor_table.measure import Measurement
-from benchmarks.sensor_table.plan import Asked, Plan
+from benchmarks.sensor_table.plan import Plan, Row
 from benchmarks.sensor_table.report import add_places, report
 
 PLAN = Path(__file__).with_name("across_sensors.yaml")
@@ -31,7 +31,7 @@ def main() -> None:
     arguments = parser.parse_args()
 
     models = dict(text.split("=", 1) for text in arguments.models)
-    rows = {title: Asked(model) for title, model in models.items()}
+    rows = {title: Row(model) for title, model in models.items()}
     plan = Plan.of_yaml(arguments.plan).with_methods(rows)
     measurement = Measurement(
         plan if arguments.data is None else plan.with_data(arguments.data),

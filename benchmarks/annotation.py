@@ -1,7 +1,7 @@
 """Labels by geometry against the truth that the simulator knows: how well, and where they err.
 
     python -m benchmarks.annotation
-    python -m benchmarks.annotation --tracks 5 --scans 3 --picture annotation.png
+    python -m benchmarks.annotation --tracks 5 --scans 3
 
 Each track is a simulated facility in which it rains at four rates, described once as the paper
 does, with drops over the road alone, and once with the ground beside it that the sprinklers wet.
@@ -11,19 +11,17 @@ import argparse
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
 from benchmarks.track_scene import scene_of_track
-from derain.annotation.picture import annotation_figure
 from derain.annotation.scene import Correction, Scene, inside
 from derain.annotation.steps import Plane, annotate, road_plane
 from derain.evaluation.counts import intersection_over_union
+from derain.evaluation.text_tables import markdown_table
 from derain.fusion import UNKNOWN
-from derain.pictures.scan_pictures import save
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass
 from derain.simulation.facility import lay_out_facility
@@ -124,43 +122,38 @@ def _variants(scene: Scene) -> dict[str, Scene]:
     return others
 
 
-def _row(*cells: object) -> str:
-    return f"| {' | '.join(map(str, cells))} |"
-
-
 def _print_tables(
     by_rate: dict[tuple[str, float], Findings],
     by_scene: dict[str, Findings],
     by_variant: dict[str, Findings],
 ) -> None:
     names = [kind.name.lower() for kind in TrackClass]
-    print(_row("drops are sought over", "rain mm/h", "points", "agreement", "rain IoU"))
-    print(_row("---", *["---:"] * 4))
+    body = []
     for (name, rate), found in by_rate.items():
         points, iou = f"{found.table.sum():,}", f"{found.iou[TrackClass.RAIN]:.4f}"
-        print(_row(name, f"{rate:g}", points, f"{found.agreement:.3%}", iou if rate else "-"))
+        body.append([name, f"{rate:g}", points, f"{found.agreement:.3%}", iou if rate else "-"])
+    head = ["drops are sought over", "rain mm/h", "points", "agreement", "rain IoU"]
+    print(markdown_table(head, body))
 
-    print("\n" + _row("IoU by class", *names))
-    print(_row("---", *["---:"] * KINDS))
-    for name, found in by_scene.items():
-        print(_row(name, *(f"{iou:.4f}" for iou in found.iou)))
+    body = [[name, *(f"{iou:.4f}" for iou in found.iou)] for name, found in by_scene.items()]
+    print("\n" + markdown_table(["IoU by class", *names], body))
 
     name, found = list(by_scene.items())[-1]
-    print("\n" + _row(f"{name}: truth \\ label", *names))
-    print(_row("---", *["---:"] * KINDS))
-    for kind, counts in zip(names, found.table, strict=True):
-        print(_row(kind, *(f"{count:,}" for count in counts)))
+    counts = found.table.tolist()
+    body = [[kind, *map("{:,}".format, row)] for kind, row in zip(names, counts, strict=True)]
+    print("\n" + markdown_table([f"{name}: truth \\ label", *names], body))
 
-    print("\n" + _row("wrong labels, share of all points", *by_scene))
-    print(_row("---", *["---:"] * len(by_scene)))
+    body = []
     for reason in found.reasons:
         shares = (each.reasons[reason] / each.table.sum() for each in by_scene.values())
-        print(_row(reason, *(f"{share:.4%}" for share in shares)))
+        body.append([reason, *(f"{share:.4%}" for share in shares)])
+    print("\n" + markdown_table(["wrong labels, share of all points", *by_scene], body))
 
-    print("\n" + _row(name, "agreement", "rain IoU"))
-    print(_row("---", "---:", "---:"))
-    for variant, found in by_variant.items():
-        print(_row(variant, f"{found.agreement:.3%}", f"{found.iou[TrackClass.RAIN]:.4f}"))
+    body = [
+        [variant, f"{found.agreement:.3%}", f"{found.iou[TrackClass.RAIN]:.4f}"]
+        for variant, found in by_variant.items()
+    ]
+    print("\n" + markdown_table([name, "agreement", "rain IoU"], body))
 
 
 def main() -> None:
@@ -170,7 +163,6 @@ def main() -> None:
     )
     parser.add_argument("--tracks", type=int, default=3, help="tracks, each at four rain rates")
     parser.add_argument("--scans", type=int, default=2, help="scans of each")
-    parser.add_argument("--picture", type=Path, help="PNG of the last scan's labels")
     arguments = parser.parse_args()
 
     by_rate: dict[tuple[str, float], Findings] = defaultdict(Findings)
@@ -186,9 +178,6 @@ def main() -> None:
             for scan in scans:
                 by_variant[name].add(scan, variant, plane)
     _print_tables(dict(sorted(by_rate.items())), by_scene, by_variant)
-    if arguments.picture:
-        title = f"Simulated rain, {rate:g} mm/h, labelled by geometry"
-        save(annotation_figure(scan, annotate(scan, scene, plane), scene, title), arguments.picture)
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from derain.cards.card import load_card
 from derain.evaluation.counts import Counts
+from derain.evaluation.text_tables import markdown_table
 from derain.scan import Scan
 from derain.system.stopwatch import Stopwatch
 from derain.views.back_projection import BACK_PROJECTIONS
@@ -55,7 +56,7 @@ class GridCounts:
         self.back.append(stopwatch.milliseconds["back"])
 
     def cells(self) -> list[str]:
-        """What the table says of it."""
+        """Its cells of the table."""
         return [
             f"{self.hidden / self.points:.1%}",
             f"{self.empty / self.pixels:.1%}",
@@ -91,10 +92,8 @@ def main() -> None:
 def _print_table(grids: dict[str, SphericalGrid], scans: Sequence[Scan], repeats: int) -> None:
     card = load_card("wads")
     rain = [card.rain_of(scan) for scan in scans]
-    print(
-        "| grid | size | back-projection | points hidden | pixels empty | IoU | view ms | back ms |"
-    )
-    print("|---|---|---|---:|---:|---:|---:|---:|")
+    head = ["grid", "size", "back-projection", "points hidden", "pixels empty", "IoU"]
+    body = []
     for title, grid in grids.items():
         for name in BACK_PROJECTIONS:
             view, counts = RangeView(grid, back_projection=name), GridCounts()
@@ -102,7 +101,8 @@ def _print_table(grids: dict[str, SphericalGrid], scans: Sequence[Scan], repeats
                 for scan, truth in zip(scans, rain, strict=True):
                     counts.add(view, scan, truth)
             size = f"{grid.rows}x{grid.columns}"
-            print("|", " | ".join([title, size, name, *counts.cells()]), "|")
+            body.append([title, size, name, *counts.cells()])
+    print(markdown_table([*head, "view ms", "back ms"], body))
 
 
 if __name__ == "__main__":

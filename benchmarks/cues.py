@@ -16,7 +16,7 @@ import torch
 from numpy.typing import NDArray
 
 from benchmarks.across_sensors import PLAN
-from benchmarks.sensor_table.data import DataFinder
+from benchmarks.sensor_table.inputs import DataFinder
 from benchmarks.sensor_table.plan import Plan
 from derain.default import default_checkpoint
 from derain.evaluation.scores import score

@@ -31,7 +31,7 @@ from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.installed import DERAIN
+from benchmarks.processes import DERAIN, end_session, of_session, started
 from derain.evaluation.text_tables import markdown_table
 
 ADDRESS = "tcp://127.0.0.1:8797"
@@ -40,6 +40,9 @@ SHARDS, DASK_WORKERS = 4, 3
 # A command that is killed is run again at most so often; a client may well need to see first that
 # its scheduler is gone.
 MOST_RUNS = 5
+
+# Seconds that the other processes of a session may take to notice that one is gone.
+NOTICE = 4
 
 
 @dataclass(frozen=True)
@@ -64,15 +67,9 @@ class Run:
         return list(map(str, named))
 
 
-def started(command: Sequence[str]) -> subprocess.Popen[bytes]:
-    """Starts a command in a session of its own, with no more than one thread a library."""
-    return subprocess.Popen(
-        command,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        env={**os.environ, "OMP_NUM_THREADS": "1"},
-        start_new_session=True,
-    )
+def quietly(command: Sequence[str]) -> subprocess.Popen[bytes]:
+    """Starts a command that prints nothing."""
+    return started(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
 @contextmanager
@@ -80,11 +77,11 @@ def cluster(folder: Path) -> Iterator[list[subprocess.Popen[bytes]]]:
     """Lends a Dask scheduler, then its workers."""
     dask = str(DERAIN.with_name("dask"))
     port = ADDRESS.rpartition(":")[2]
-    processes = [started([dask, "scheduler", "--port", port, "--no-dashboard"])]
+    processes = [quietly([dask, "scheduler", "--port", port, "--no-dashboard"])]
     for number in range(DASK_WORKERS):
         place = str(folder / f"dask {number}")
         options = ["--nthreads", "1", "--no-dashboard", "--local-directory", place]
-        processes.append(started([dask, "worker", ADDRESS, *options]))
+        processes.append(quietly([dask, "worker", ADDRESS, *options]))
     while True:
         with suppress(OSError):
             socket.create_connection(("127.0.0.1", int(port)), 1).close()
@@ -96,7 +93,7 @@ def cluster(folder: Path) -> Iterator[list[subprocess.Popen[bytes]]]:
         for process in processes:
             process.kill()
             process.wait()
-            end_session(process.pid)
+            end_session(process.pid, NOTICE)
 
 
 def one_process(run: Run, out: Path) -> None:
@@ -215,7 +212,7 @@ def kill_once(
     """Kills a victim at a random moment after the first unit is done; whether it was in time."""
     options = {"two workers": ["--workers", "2"], "four shards": ["--shard", f"1/{SHARDS}"]}
     with cluster(run.root) if victim in OF_DASK else nullcontext([]) as processes:
-        client = started(run.command(out, *options.get(WAY_OF[victim], ["--dask", ADDRESS])))
+        client = quietly(run.command(out, *options.get(WAY_OF[victim], ["--dask", ADDRESS])))
         while client.poll() is None and not any((out / ".derain/units").rglob("*.json")):
             time.sleep(0.05)
         time.sleep(generator.uniform(0, seconds[WAY_OF[victim]] / 4))
@@ -225,7 +222,7 @@ def kill_once(
         elif victim == "a worker of Dask":
             processes[generator.randrange(1, len(processes))].kill()
         elif victim == "a worker":
-            if others := sorted(of_session(client.pid) - {client.pid}):
+            if others := sorted(set(of_session(client.pid)) - {client.pid}):
                 os.kill(generator.choice(others), signal.SIGKILL)
         else:
             client.kill()
@@ -234,7 +231,7 @@ def kill_once(
         except subprocess.TimeoutExpired:
             print(f"{victim}: the client goes on for ever", file=sys.stderr)
             client.kill()
-        end_session(client.pid)
+        end_session(client.pid, NOTICE)
     return in_time
 
 
@@ -259,29 +256,6 @@ def checksum(out: Path) -> str:
         if path.is_file() and ".derain" not in path.parts:
             digest.update(str(path.relative_to(out)).encode() + path.read_bytes())
     return digest.hexdigest()
-
-
-def of_session(session: int) -> set[int]:
-    """Processes of a session."""
-    found = set()
-    for folder in Path("/proc").glob("[0-9]*"):
-        try:
-            fields = (folder / "stat").read_text().rpartition(") ")[2].split()
-            if int(fields[3]) == session and fields[0] != "Z":
-                found.add(int(folder.name))
-        except OSError:
-            continue  # it ended meanwhile
-    return found
-
-
-def end_session(session: int) -> None:
-    """Waits a moment for the other processes of a session, then kills them."""
-    for _ in range(20):
-        if not of_session(session):
-            return
-        time.sleep(0.2)
-    for process in of_session(session):
-        os.kill(process, signal.SIGKILL)
 
 
 if __name__ == "__main__":

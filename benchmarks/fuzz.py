@@ -1,4 +1,4 @@
-"""Gives every reader damaged files, and says what each made of them.
+"""Gives every reader damaged files, and prints what each made of them.
 
     python -m benchmarks.fuzz --inputs 100000 --workers 2
     python -m benchmarks.fuzz --replay runs/fuzz/pcd-0-1234
@@ -151,7 +151,7 @@ def _judged(
 
 
 def _keep(name: str, outcome: Outcome, folder: Path, arguments: argparse.Namespace) -> None:
-    """Copies what was read, and says how to read it again."""
+    """Copies what was read, so that it can be read again."""
     tqdm.write(f"{name}:{outcome.number} {outcome.verdict}", sys.stdout)
     kept = arguments.out / f"{name}-{arguments.seed}-{outcome.number}"
     shutil.rmtree(kept, ignore_errors=True)
@@ -162,7 +162,7 @@ def _keep(name: str, outcome: Outcome, folder: Path, arguments: argparse.Namespa
 
 
 def _replay(finding: Path) -> int:
-    """Reads a finding in this process, which shows all that is said of it."""
+    """Reads a finding in this process, which shows the whole error."""
     name = finding.name.rsplit("-", 2)[0]
     with tempfile.TemporaryDirectory() as scratch:
         copy = shutil.copytree(finding, Path(scratch) / "finding")

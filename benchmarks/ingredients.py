@@ -10,14 +10,173 @@ across_sensors.yaml or of another `--columns`, where labels have a part in the s
 """
 
 import argparse
+import re
+import shlex
+import shutil
+import subprocess
 import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+import yaml
 
 from benchmarks.across_sensors import PLAN
+from benchmarks.processes import DERAIN
 from benchmarks.sensor_table.measure import Measurement
-from benchmarks.sensor_table.plan import Asked, Plan
+from benchmarks.sensor_table.plan import Plan, Row
 from benchmarks.sensor_table.report import add_places, report
-from benchmarks.sensor_table.sweep import Sweep
+
+# Folder of the data sets; no variant's is called so.
+DATA_SETS = "data-sets"
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A model.
+
+    Attributes:
+        title: What it is called.
+        fit: Options of ``derain fit``; ``{name}`` stands for the folder of a data set.
+        export: Further options of ``derain export``.
+        thresholds: A row of the table for each; none takes the model as it is.
+    """
+
+    title: str
+    fit: str
+    export: str = ""
+    thresholds: tuple[float, ...] = ()
+
+    @property
+    def folder(self) -> str:
+        """Its title as the name of a folder."""
+        return re.sub(r"[^\w.]+", "_", self.title).strip("_")
+
+    def rows(self) -> Iterator[tuple[str, dict[str, Any]]]:
+        """Titles of its rows in a table, and the settings of each."""
+        for threshold in self.thresholds:
+            yield f"{self.title}, at {threshold:g}", {"threshold": threshold}
+        if not self.thresholds:
+            yield self.title, {}
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """What is trained, and where.
+
+    Attributes:
+        data: Data sets by name, each the command of derain that makes it, but for its folder.
+        variants: The models.
+        common: Options of every ``derain fit``, before those of the variant. Its configuration is
+            taken where the variant names none of its own.
+        folder: Where data sets and models go, and are found in again.
+    """
+
+    data: Mapping[str, str]
+    variants: Sequence[Variant]
+    common: str
+    folder: Path
+
+    @classmethod
+    def of_yaml(cls, path: Path, folder: Path) -> "Sweep":
+        """Reads a sweep: ``seed``, ``epochs``, ``common``, ``data`` and ``variants``.
+
+        Variants of a title are options of ``derain fit``, or a mapping of ``fit``, ``export`` and
+        ``thresholds``.
+
+        Raises:
+            ValueError: Two variants whose folders would be called the same, or one without a name.
+        """
+        content = yaml.safe_load(path.read_text("utf-8"))
+        variants = []
+        for title, described in content["variants"].items():
+            given = {"fit": described} if isinstance(described, str) else dict(described)
+            given.setdefault("thresholds", content.get("thresholds", ()))
+            given["thresholds"] = tuple(given["thresholds"])
+            variants.append(Variant(title, **given))
+        folders = {variant.folder for variant in variants} - {""}
+        if len(folders) < len(variants):
+            raise ValueError(f"{path}: titles of variants have to differ in their letters")
+        alike = f"--seed_everything {content['seed']} --trainer.max_epochs {content['epochs']}"
+        common = f"{alike} {content.get('common', '')}".strip()
+        return cls(content.get("data", {}), variants, common, folder)
+
+    def model(self, variant: Variant) -> Path:
+        """The file of a variant's model."""
+        return self.folder / variant.folder / "model.onnx"
+
+    def commands(self, variant: Variant) -> list[list[str]]:
+        """What makes the model: of the data sets that it names, of the training, and the export."""
+        sets = {f"{{{name}}}": str(self.folder / DATA_SETS / name) for name in self.data}
+        folder = self.folder / variant.folder
+        made = [
+            [*shlex.split(self.data[name.strip("{}")]), "--out", out]
+            for name, out in sets.items()
+            if name in variant.fit
+        ]
+        configurations, others = _options(shlex.split(self.common))
+        own, changes = _options([_filled(word, sets) for word in shlex.split(variant.fit)])
+        kept = ["--checkpoint.dirpath", str(folder), "--checkpoint.filename", "model"]
+        log = ["--trainer.logger.save_dir", str(folder / "runs")]
+        export = ["--out", str(self.model(variant)), *shlex.split(variant.export)]
+        return [
+            *made,
+            ["fit", *(own or configurations), *others, *changes, *log, *kept],
+            ["export", str(folder / "model.ckpt"), *export],
+        ]
+
+    def listing(self, variant: Variant) -> str:
+        """The commands of a variant, for whoever repeats it."""
+        lines = [f"    derain {shlex.join(command)}" for command in self.commands(variant)]
+        return "\n".join([f"{variant.title}:\n", *lines])
+
+    def train(self, variant: Variant) -> str | None:
+        """Makes a variant's model, unless these commands made the one that is there.
+
+        Returns:
+            Why there is none; None where all went well.
+        """
+        folder = self.folder / variant.folder
+        record, commands = folder / "commands.txt", self.listing(variant)
+        same = record.exists() and record.read_text("utf-8") == commands
+        if same and self.model(variant).exists():
+            return None
+        if folder.exists():
+            shutil.rmtree(folder)
+        folder.mkdir(parents=True)
+        with (folder / "log.txt").open("w") as log:
+            for command in self.commands(variant):
+                done = subprocess.run(
+                    [DERAIN, *command], stdout=log, stderr=subprocess.STDOUT, check=False
+                )
+                if done.returncode:
+                    return f"derain {command[0]} failed; see {folder / 'log.txt'}"
+        record.write_text(commands, "utf-8")  # last: what is stopped before is made anew
+        return None
+
+
+def _filled(word: str, sets: Mapping[str, str]) -> str:
+    """A word of a command, with the folders of data sets for their names in braces."""
+    for name, folder in sets.items():
+        word = word.replace(name, folder)
+    return word
+
+
+def _options(words: Sequence[str]) -> tuple[list[str], list[str]]:
+    """The configurations that a training's options name, and the other options.
+
+    A configuration overrides what stands before it, so it has to be named first.
+    """
+    configurations: list[str] = []
+    others: list[str] = []
+    rest = iter(words)
+    for word in rest:
+        if word == "--config":
+            configurations += [word, next(rest)]
+        else:
+            others.append(word)
+    return configurations, others
 
 
 def main() -> None:
@@ -41,7 +200,7 @@ def main() -> None:
         if reason := sweep.train(variant):
             failed[variant.title] = reason
     rows = {
-        title: Asked(str(sweep.model(variant)), settings)
+        title: Row(str(sweep.model(variant)), settings)
         for variant in variants
         if variant.title not in failed
         for title, settings in variant.rows()
@@ -49,7 +208,7 @@ def main() -> None:
     plan = columns.with_only(rows)
     measurement = Measurement(plan, arguments.shared, arguments.work, arguments.threads)
     measurement.left_out.reasons |= failed
-    report(measurement, arguments.out, turned=False, notes=[sweep.told(v) for v in variants])
+    report(measurement, arguments.out, turned=False, notes=[sweep.listing(v) for v in variants])
     raise SystemExit(bool(failed))
 
 

@@ -16,29 +16,35 @@ Ends with a table, and with 1 where anything fell short. Linux only.
 """
 
 import argparse
-import os
+import json
 import random
 import re
 import shutil
 import signal
+import sqlite3
 import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import yaml
+from PIL import Image
 from tqdm import tqdm
 
-from benchmarks.installed import DERAIN
+from benchmarks.processes import DERAIN, end_session, started
 from benchmarks.small_inputs import COMMANDS, SmallInputs
-from benchmarks.whole_files import fault_of
+from derain.bags.bag import Bag
 from derain.cli.signals import interrupting
 from derain.evaluation.text_tables import markdown_table
+from derain.export.runtime import Derainer
+from derain.files import read_scan
 from derain.jobs.job import FOLDER as RECORDS
+from derain.models.checkpoint import load_model
 
 # Seconds that what a command began may take to notice that it is gone: a data loader of torch's
 # looks every five.
@@ -103,9 +109,9 @@ def main() -> int:
 def undisturbed(arguments: Sequence[str | Path], folder: Path) -> Victim:
     """Lets a command finish, and times it."""
     begun = time.monotonic()
-    process = started(arguments, folder)
+    process = run_in(folder, arguments)
     if ended(process):
-        raise RuntimeError(f"fails undisturbed: {said(folder)}")
+        raise RuntimeError(f"fails undisturbed: {printed(folder)}")
     return Victim(arguments, folder, time.monotonic() - begun)
 
 
@@ -121,26 +127,26 @@ def kill_once(victim: Victim, generator: random.Random, folder: Path, again: boo
     if again:
         shutil.copytree(victim.folder / "out", folder / "out")
     by = generator.choice([signal.SIGKILL] * 3 + [signal.SIGTERM])
-    process = started(victim.arguments, folder)
+    process = run_in(folder, victim.arguments)
     try:
         ended(process, within=generator.uniform(0, victim.seconds))
     except subprocess.TimeoutExpired:
         process.send_signal(by)
     code, counts = ended(process), Counter(kills=1)
-    orphans = left_running(process.pid)
+    orphans = end_session(process.pid, NOTICE)
     counts["finished first"] = int(code == 0)
     # Python is not listening yet in its first moments.
     counts["wrong exit"] = int(code not in (0, -by, 128 + by))
     counts["left running"] = len(orphans)
     counts[f"left by {by.name}"] = len(temporary_files(victim, folder)) if code else 0
-    faults = [f"exit {code} after {by.name}: {said(folder)}"] if counts["wrong exit"] else []
+    faults = [f"exit {code} after {by.name}: {printed(folder)}"] if counts["wrong exit"] else []
     faults += [f"left running: {orphan}" for orphan in orphans]
     cut = half_written(victim, folder, complete=False)
     counts["half-written"] = len(cut)
     faults += [f"half-written: {fault}" for fault in cut]
     if by == signal.SIGTERM:
         faults += [f"left by SIGTERM: {file}" for file in temporary_files(victim, folder)]
-    failed = [said(folder)] if ended(started(victim.arguments, folder)) else []
+    failed = [printed(folder)] if ended(run_in(folder, victim.arguments)) else []
     failed += half_written(victim, folder, complete=True)
     counts["failed again"] = int(bool(failed))
     counts["left after the next run"] = len(temporary_files(victim, folder))
@@ -148,18 +154,17 @@ def kill_once(victim: Victim, generator: random.Random, folder: Path, again: boo
     return [*faults, *(f"again: {fault}" for fault in failed)]
 
 
-def started(arguments: Sequence[str | Path], folder: Path) -> subprocess.Popen[bytes]:
-    """Starts a command in a session and a folder of its own, its temporary files included."""
+def run_in(folder: Path, arguments: Sequence[str | Path]) -> subprocess.Popen[bytes]:
+    """Starts a command of derain in a folder of its own, its temporary files included."""
     (folder / "out").mkdir(parents=True, exist_ok=True)
     (folder / "tmp").mkdir(exist_ok=True)
-    with (folder / "said").open("wb") as output:
-        return subprocess.Popen(
+    with (folder / "printed").open("wb") as output:
+        return started(
             [DERAIN, *arguments],
             cwd=folder,
-            env={**os.environ, "TMPDIR": str(folder / "tmp"), "OMP_NUM_THREADS": "1"},
+            env={"TMPDIR": str(folder / "tmp")},
             stdout=output,
             stderr=subprocess.STDOUT,
-            start_new_session=True,
         )
 
 
@@ -172,31 +177,9 @@ def ended(process: subprocess.Popen[bytes], within: float | None = None) -> int:
         raise
 
 
-def said(folder: Path) -> str:
-    """The end of what the last command in a folder has said."""
-    return (folder / "said").read_text(errors="replace")[-500:].strip()
-
-
-def left_running(session: int) -> list[str]:
-    """Command lines of what still runs of a session after a while; they are ended then."""
-    give_up = time.monotonic() + NOTICE
-    while (processes := _of_session(session)) and time.monotonic() < give_up:
-        time.sleep(0.2)
-    for process in processes:
-        os.kill(process, signal.SIGKILL)
-    return list(processes.values())
-
-
-def _of_session(session: int) -> dict[int, str]:
-    found = {}
-    for folder in Path("/proc").glob("[0-9]*"):
-        try:
-            state, _, _, of = (folder / "stat").read_text().rpartition(") ")[2].split()[:4]
-            if int(of) == session and state != "Z":
-                found[int(folder.name)] = (folder / "cmdline").read_text().replace("\0", " ")
-        except OSError:
-            continue  # it ended meanwhile
-    return found
+def printed(folder: Path) -> str:
+    """The end of what the last command in a folder printed."""
+    return (folder / "printed").read_text(errors="replace")[-500:].strip()
 
 
 def temporary_files(victim: Victim, folder: Path) -> list[Path]:
@@ -228,6 +211,61 @@ def _by_name(folder: Path) -> dict[str, Path]:
     paths = [path.relative_to(folder) for path in sorted(folder.rglob("*")) if path.is_file()]
     seen = [path for path in paths if not any(part[0] == "." for part in path.parts)]
     return {OF_ONE_RUN.sub("*", path.as_posix()): folder / path for path in seen}
+
+
+def fault_of(file: Path, size: int | None) -> str | None:
+    """What is wrong with a file; None if it is whole, or is one that its writer only adds to.
+
+    Args:
+        file: The file.
+        size: Its length undisturbed, in bytes, where that is known.
+    """
+    if file.suffix in _READERS:
+        try:
+            _READERS[file.suffix](file)
+        except Exception as error:
+            return f"{type(error).__name__}: {error}"
+    elif file.suffix in (".bin", ".label") and size not in (None, file.stat().st_size):
+        return f"{file.stat().st_size} bytes, not {size}"
+    return None
+
+
+def _lines(file: Path) -> None:
+    assert file.read_text("utf-8").endswith("\n"), "the last line is cut"
+
+
+def _yaml(file: Path) -> None:
+    assert yaml.safe_load(file.read_text("utf-8")) is not None, "empty"
+
+
+def _picture(file: Path) -> None:
+    with Image.open(file) as image:
+        image.load()
+
+
+def _bag(file: Path) -> None:
+    assert sum(1 for _ in Bag(file).messages()), "no messages"
+
+
+def _database(file: Path) -> None:
+    with sqlite3.connect(file) as database:
+        assert database.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
+
+
+_READERS: dict[str, Callable[[Path], object]] = {
+    ".bag": _bag,
+    ".ckpt": load_model,
+    ".csv": _lines,
+    ".db": _database,
+    ".db3": _bag,
+    ".json": lambda file: json.loads(file.read_text("utf-8")),
+    ".mcap": _bag,
+    ".md": _lines,
+    ".npz": read_scan,
+    ".onnx": Derainer,
+    ".png": _picture,
+    ".yaml": _yaml,
+}
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ from labelled import read_labelled
 
 from derain.cards.card import load_card
 from derain.evaluation.counts import SCORES, Counts
+from derain.evaluation.text_tables import markdown_table
 from derain.models.checkpoint import load_model
 from derain.models.lisnownet import LiSnowNet
 from derain.models.lisnownet.selection_rule import SelectionRule
@@ -44,12 +45,12 @@ def main() -> None:
         "without the limit of intensity": {"intensity": 2.0},
         **{f"residual {value:g}": {"residual": value} for value in np.geomspace(5e-4, 0.128, 9)},
     }
-    print("| rule | P | R | F1 | IoU |\n|---|---:|---:|---:|---:|")
+    body = []
     for name, changes in rules.items():
         model.selection = SelectionRule(**{**own, **changes})
         counts = _counts(model, scans)
-        scores = " | ".join(f"{getattr(counts, score):.3f}" for score in SCORES)
-        print(f"| {name} | {scores} |")
+        body.append([name, *(f"{getattr(counts, score):.3f}" for score in SCORES)])
+    print(markdown_table(["rule", "P", "R", "F1", "IoU"], body))
     print(own)
 
 

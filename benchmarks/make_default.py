@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.installed import DERAIN
+from benchmarks.processes import DERAIN
 from derain.cards.card import load_card
 from derain.datamodules.worlds import Worlds
 from derain.errors import InputError

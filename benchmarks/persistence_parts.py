@@ -20,6 +20,7 @@ from derain.cards.card import load_card
 from derain.datamodules.base import Loading
 from derain.datamodules.labelled import named_scans
 from derain.evaluation.counts import Counts
+from derain.evaluation.text_tables import markdown_table
 from derain.recordings.evidence import (
     ScanPoints,
     combined_log_odds,
@@ -54,24 +55,23 @@ def main() -> None:
             rain = card.rain_of(scan)[first]
             for name, log_odds in _by_parts(points, windows):
                 counts[name].append(Counts.of(log_odds > 0, rain))
-    print(f"| {card.title} | P | R | IoU | lowest of a scan |\n|---|---:|---:|---:|---:|")
+    body = []
     for name, of_scans in counts.items():
         pooled = sum(of_scans[1:], of_scans[0])
         lowest = min(each.iou for each in of_scans)
-        print(
-            f"| {name} | {pooled.precision:.3f} | {pooled.recall:.3f} | {pooled.iou:.3f} "
-            f"| {lowest:.3f} |"
-        )
+        scores = (pooled.precision, pooled.recall, pooled.iou, lowest)
+        body.append([name, *(f"{score:.3f}" for score in scores)])
+    print(markdown_table([card.title, "P", "R", "IoU", "lowest of a scan"], body))
 
 
 def _seen(
     recording: Sequence[Frame],
 ) -> Iterator[tuple[Frame, ScanPoints, dict[str, RayEvidence]]]:
-    """Each frame that has others around it, with what the scans of each window say."""
+    """Each frame that has others around it, and the evidence of each window."""
     points = [ScanPoints.of(frame.read(), usable_cores()) for frame in recording]
     most = 2 if len(recording) > 6 else 1
     for place in range(most, len(recording) - most):
-        told = {
+        evidence = {
             step: points[place].evidence_of(
                 points[place + step],
                 np.linalg.inv(_pose(recording[place + step])) @ _pose(recording[place]),
@@ -83,9 +83,9 @@ def _seen(
             recording[place],
             points[place],
             {
-                name: mean_evidence([told[step] for step in steps])
+                name: mean_evidence([evidence[step] for step in steps])
                 for name, steps in WINDOWS.items()
-                if told.keys() >= {*steps}
+                if evidence.keys() >= {*steps}
             },
         )
 

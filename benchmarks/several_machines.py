@@ -32,7 +32,7 @@ from pathlib import Path
 
 import torch
 
-from benchmarks.installed import DERAIN
+from benchmarks.processes import DERAIN
 from derain.evaluation.text_tables import markdown_table
 from derain.export.timing import versions
 

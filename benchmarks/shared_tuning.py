@@ -12,6 +12,7 @@ from pathlib import Path
 
 import optuna
 
+from benchmarks.labelled import read_labelled
 from derain.cards.card import load_card
 from derain.evaluation.text_tables import markdown_table
 from derain.export.shared_trials import SharedTrials
@@ -21,8 +22,6 @@ from derain.export.tuning import (
     neighbours_to_find,
     pooled_iou,
 )
-from derain.files import read_scan
-from derain.files.labels import read_labels
 from derain.filters import filter_from
 
 SEARCHES = (1, 2, 4, 8)
@@ -56,13 +55,10 @@ def main() -> None:
 
 def _scans(name: str, folder: Path, most: int) -> list[LabelledNeighbourhoods]:
     card, neighbours = load_card("wads"), neighbours_to_find(name)
-    found = []
-    for path in sorted(folder.glob("*.bin"))[:most]:
-        label = folder.parent / "labels" / f"{path.stem}.label"
-        scan = read_scan(path)
-        scan = scan.with_label(read_labels(label, len(scan)))
-        found.append(LabelledNeighbourhoods.of(scan, card, neighbours, threads=1))
-    return found
+    return [
+        LabelledNeighbourhoods.of(read_labelled(path), card, neighbours, threads=1)
+        for path in sorted(folder.glob("*.bin"))[:most]
+    ]
 
 
 def _best(

@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.labelled import read_labelled
 from derain.cards.card import load_card
 from derain.datamodules.user_changes import across, along
 from derain.evaluation.text_tables import markdown_table
 from derain.export.methods import load_method
 from derain.files import read_scan
-from derain.files.labels import label_beside, read_labels, semantic
 from derain.scan import Scan
 
 SNOW = Path("data/wads/sample.bin")
@@ -37,11 +37,8 @@ def main() -> None:
     parser.add_argument("--methods", nargs="+", required=True, help="models and filters")
     arguments = parser.parse_args()
     methods = {name: load_method(name, {}) for name in arguments.methods}
-    card, path = load_card("wads"), arguments.shared / SNOW
-    snow = read_scan(path)
-    snow = snow.with_label(semantic(read_labels(label_beside(path), len(snow))))
-    rows = []
-    for name, scan in changed(snow):
+    card, rows = load_card("wads"), []
+    for name, scan in changed(read_labelled(arguments.shared / SNOW)):
         rain = card.rain_of(scan)
         ious = [iou(method.push(scan).rain, rain) for method in methods.values()]
         rows.append([name, *(f"{value:.3f}" for value in ious)])

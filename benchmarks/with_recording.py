@@ -12,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from benchmarks.across_sensors import PLAN
-from benchmarks.sensor_table.data import DataFinder
+from benchmarks.sensor_table.inputs import DataFinder
 from benchmarks.sensor_table.plan import Plan
 from derain.default import DEFAULT
 from derain.evaluation.scores import score

@@ -9,9 +9,8 @@ import pytest
 
 from benchmarks.across_sensors import main
 from benchmarks.sensor_table.columns import Cell, Column, table
-from benchmarks.sensor_table.measure import Measurement
+from benchmarks.sensor_table.measure import Measurement, factor_for
 from benchmarks.sensor_table.plan import Plan
-from benchmarks.sensor_table.unit import factor_for
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
 from derain.filters import CRF, DROR, FilterDerainer

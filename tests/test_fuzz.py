@@ -8,7 +8,7 @@ from broken_readers import readers
 
 from benchmarks.fuzz import main
 from benchmarks.fuzzing import scans
-from benchmarks.fuzzing.format_inputs import INPUTS
+from benchmarks.fuzzing.formats import INPUTS
 from benchmarks.fuzzing.worker import Worker
 from derain.files.format import FORMATS
 
@@ -37,7 +37,7 @@ def test_every_reader_reads_refuses_and_never_breaks(
 
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_every_format_has_hostile_and_sound_files_in_the_fuzzer(suffix: str) -> None:
-    assert suffix in INPUTS, f"add a file to benchmarks/fuzzing/formats for {suffix}"
+    assert suffix in INPUTS, f"add {suffix} to benchmarks/fuzzing/formats.py"
     extra = FORMATS[suffix].EXTRA
     if extra is not None and not extra.installed:
         pytest.skip(f"{extra.library} is not installed")

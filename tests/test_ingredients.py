@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.sensor_table import sweep
-from benchmarks.sensor_table.sweep import Sweep, Variant
+from benchmarks import ingredients
+from benchmarks.ingredients import Sweep, Variant
 
 PLAN = """\
 seed: 4
@@ -40,7 +40,7 @@ def calls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     stand_in, calls = tmp_path / "derain", tmp_path / "calls.txt"
     stand_in.write_text(STAND_IN.format(calls=calls))
     stand_in.chmod(0o755)
-    monkeypatch.setattr(sweep, "DERAIN", stand_in)
+    monkeypatch.setattr(ingredients, "DERAIN", stand_in)
     return calls
 
 

@@ -58,7 +58,7 @@ def victim(kills: ModuleType, tmp_path: Path) -> object:
         *(("table.md", 4), ("picture.png", 1000)),
     ],
 )
-def test_a_file_that_is_cut_short_is_told(
+def test_a_file_that_is_cut_short_is_found(
     kills: ModuleType, victim: object, tmp_path: Path, name: str, left: int
 ) -> None:
     shutil.copytree(tmp_path / "undisturbed", tmp_path / "kill")
@@ -72,18 +72,17 @@ def test_a_file_that_is_cut_short_is_told(
     assert kills.half_written(victim, tmp_path / "kill", complete=True) == [f"{name} is missing"]
 
 
-def test_what_is_left_lying_about_or_running_is_told(
-    kills: ModuleType, victim: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_what_is_left_lying_about_or_running_is_found(
+    kills: ModuleType, victim: object, tmp_path: Path
 ) -> None:
     shutil.copytree(tmp_path / "undisturbed", tmp_path / "kill")
     assert kills.temporary_files(victim, tmp_path / "kill") == []
     (tmp_path / "kill/out/.derain-0.bin").touch()
     (tmp_path / "kill/tmp/x").touch()
     assert len(kills.temporary_files(victim, tmp_path / "kill")) == 2
-    monkeypatch.setattr(kills, "NOTICE", 0)
     with subprocess.Popen(["sleep", "600"], start_new_session=True) as process:
         while not Path(f"/proc/{process.pid}/cmdline").read_bytes():
             time.sleep(0.01)  # it is not that program yet
-        assert kills.left_running(process.pid) == ["sleep 600 "]
+        assert kills.end_session(process.pid, 0) == ["sleep 600 "]
         process.wait()
-        assert kills.left_running(process.pid) == []
+        assert kills.end_session(process.pid, 0) == []

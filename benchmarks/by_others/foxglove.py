@@ -17,15 +17,19 @@ import sys
 from zlib import crc32
 
 import numpy as np
-from asked import asked
+from comparison import (
+    PERIOD,
+    POINTS,
+    START,
+    make_or_compare,
+    messages_that_stay,
+    points_that_stay,
+)
 from mcap.reader import NonSeekingReader, SeekingReader, make_reader
 from mcap.writer import CompressionType, IndexType
 from mcap.writer import Writer as McapWriter
 from mcap_ros2.decoder import DecoderFactory
 from mcap_ros2.writer import Writer
-
-POINTS = "/velodyne_points"
-PERIOD, START = 100_000_000, 1_700_000_000_123_456_789
 
 TIME = "int32 sec\nuint32 nanosec\n"
 HEADER = "builtin_interfaces/Time stamp\nstring frame_id\n"
@@ -63,17 +67,11 @@ KINDS = {
 }
 
 
-def main() -> int:
-    """Makes bags, or compares two."""
-    arguments = asked(__doc__)
-    if arguments.command == "compare":
-        made = arguments.after / f"{arguments.after.name}.mcap"
-        return compare_files(arguments.before, made, arguments.masks)
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    scans = sorted(arguments.scans.glob("*.bin"))[: arguments.number]
+def make_files(folder, scans):
+    """A file of each kind."""
+    folder.mkdir(parents=True, exist_ok=True)
     for kind, options in KINDS.items():
-        make_file(arguments.out / f"{kind}.mcap", options, scans)
-    return 0
+        make_file(folder / f"{kind}.mcap", options, scans)
 
 
 def make_file(path, options, scans):
@@ -87,8 +85,8 @@ def make_file(path, options, scans):
         text = writer.register_msgdef("std_msgs/msg/String", "string data\n")
         for number, scan in enumerate(scans):
             time = START + number * PERIOD
-            said = {"data": f"cloud {number} ✓"}
-            writer.write_message("/driver", text, said, time, time - 500, 10 + number)
+            content = {"data": f"cloud {number} ✓"}
+            writer.write_message("/driver", text, content, time, time - 500, 10 + number)
             message = cloud_of(scan, time - 9000)
             writer.write_message(POINTS, cloud, message, time, time - 1000, 20 + number)
         picture = bytes(range(256)) * 100
@@ -118,26 +116,16 @@ def cloud_of(scan, time):
 
 
 def compare_files(before, after, masks):
-    """Compares message by message, and says what it found."""
-    old, new = messages(before), messages(after)
-    rain = [np.fromfile(mask, "<u4") == 1 for mask in sorted(masks.glob("*.label"))]
-    kept = [points[~drops] for points, drops in zip(clouds(before), rain, strict=True)]
-    left = clouds(after)
-    others = [(a, b) for a, b in zip(old, new, strict=False) if a[0] != POINTS]
-    findings = {
-        f"{len(old)} messages": len(old) == len(new),
-        "topics, numbers, times of recording and publication": [m[:4] for m in old]
-        == [m[:4] for m in new],
+    """Compares message by message."""
+    after = after / f"{after.name}.mcap"
+    head = "topics, numbers, times of recording and publication", 4
+    return {
+        **messages_that_stay(messages(before), messages(after), head),
         "schemas, encodings and notes of channels": described(before) == described(after),
-        f"{len(others)} messages of other topics, byte for byte": all(a == b for a, b in others),
         "attachments and metadata": attached(before) == attached(after),
-        f"{sum(map(len, left)):,} points left of {sum(map(len, rain)):,}": len(left) == len(kept)
-        and all(map(np.array_equal, left, kept)),
+        **points_that_stay(clouds(before), clouds(after), masks),
         "checksums, summary and index": is_sound(after),
     }
-    for title, found in findings.items():
-        print(f"{before.stem:10} {'same' if found else 'DIFFERENT':10} {title}")
-    return 0 if all(findings.values()) else 1
 
 
 def messages(path):
@@ -160,7 +148,7 @@ def clouds(path):
 
 
 def described(path):
-    """What a file says of its channels."""
+    """What a file holds of its channels."""
     with path.open("rb") as file:
         return {
             (
@@ -200,4 +188,4 @@ def is_sound(path):
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(make_or_compare(__doc__, make_files, compare_files))

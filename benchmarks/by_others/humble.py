@@ -14,8 +14,15 @@ import sys
 
 import numpy as np
 import yaml
-from asked import asked
-from foxglove import CLOUD, PERIOD, POINTS, START, cloud_of
+from comparison import (
+    PERIOD,
+    POINTS,
+    START,
+    make_or_compare,
+    messages_that_stay,
+    points_that_stay,
+)
+from foxglove import CLOUD, cloud_of
 from mcap_ros2._dynamic import generate_dynamic, serialize_dynamic
 
 TABLES = """
@@ -55,16 +62,6 @@ KEYS = {
     *("relative_file_paths", "files"),
 }
 TOPIC_KEYS = {"name", "type", "serialization_format", "offered_qos_profiles"}
-
-
-def main() -> int:
-    """Makes a bag, or compares two."""
-    arguments = asked(__doc__)
-    if arguments.command == "compare":
-        return compare_bags(arguments.before, arguments.after, arguments.masks)
-    scans = sorted(arguments.scans.glob("*.bin"))[: arguments.number]
-    make_bag(arguments.out, scans)
-    return 0
 
 
 def make_bag(folder, scans):
@@ -111,33 +108,23 @@ def make_bag(folder, scans):
 
 
 def compare_bags(before, after, masks):
-    """Compares message by message, and says what it found."""
+    """Compares message by message."""
     old, new = messages(before), messages(after)
-    rain = [np.fromfile(mask, "<u4") == 1 for mask in sorted(masks.glob("*.label"))]
-    kept = [points[~drops] for points, drops in zip(clouds(old), rain, strict=True)]
-    left = clouds(new)
-    others = [(a, b) for a, b in zip(old, new, strict=False) if a[0] != POINTS]
-    findings = {
-        f"{len(old)} messages": len(old) == len(new),
-        "topics and times": [m[:2] for m in old] == [m[:2] for m in new],
+    return {
+        **messages_that_stay(old, new, ("topics and times", 2)),
         "types, encodings and quality of service": topics_of(before) == topics_of(after),
-        f"{len(others)} messages of other topics, byte for byte": all(a == b for a, b in others),
-        f"{sum(map(len, left)):,} points left of {sum(map(len, rain)):,}": len(left) == len(kept)
-        and all(map(np.array_equal, left, kept)),
+        **points_that_stay(clouds(old), clouds(new), masks),
         "metadata.yaml is complete, and right": metadata_is_right(after, new),
     }
-    for title, found in findings.items():
-        print(f"{before.name:10} {'same' if found else 'DIFFERENT':10} {title}")
-    return 0 if all(findings.values()) else 1
 
 
 def metadata(folder):
-    """What the metadata.yaml says."""
+    """What the metadata.yaml holds."""
     return yaml.safe_load((folder / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
 
 
 def rows(folder, query):
-    """What its databases say."""
+    """What a query finds in its databases."""
     found = []
     for name in metadata(folder)["relative_file_paths"]:
         database = sqlite3.connect(f"file:{folder / name}?mode=ro", uri=True)
@@ -157,14 +144,15 @@ def messages(folder):
 
 
 def topics_of(folder):
-    """What databases and metadata.yaml say of topics, quality of service as values."""
+    """What databases and metadata.yaml hold of topics, quality of service as values."""
     query = "SELECT name, type, serialization_format, offered_qos_profiles FROM topics"
     in_database = [(*row[:3], yaml.safe_load(row[3])) for row in rows(folder, query)]
     in_file = []
     for topic in metadata(folder)["topics_with_message_count"]:
-        told = topic["topic_metadata"]
-        profiles = yaml.safe_load(told["offered_qos_profiles"])
-        in_file.append((told["name"], told["type"], told["serialization_format"], profiles))
+        described = topic["topic_metadata"]
+        profiles = yaml.safe_load(described["offered_qos_profiles"])
+        names = [described[key] for key in ("name", "type", "serialization_format")]
+        in_file.append((*names, profiles))
     return sorted(in_database, key=str), sorted(in_file, key=str)
 
 
@@ -179,22 +167,22 @@ def clouds(found):
 
 
 def metadata_is_right(folder, found):
-    """Whether the metadata.yaml has all that ROS 2 asks for, and says what the database has."""
-    told, times = metadata(folder), [time for _, time, _ in found]
-    assert told.keys() >= KEYS, KEYS - told.keys()
+    """Whether the metadata.yaml has all that ROS 2 asks for, and agrees with the database."""
+    content, times = metadata(folder), [time for _, time, _ in found]
+    assert content.keys() >= KEYS, KEYS - content.keys()
     counts = {}
-    for topic in told["topics_with_message_count"]:
+    for topic in content["topics_with_message_count"]:
         assert topic["topic_metadata"].keys() >= TOPIC_KEYS
         counts[topic["topic_metadata"]["name"]] = topic["message_count"]
     return (
-        told["storage_identifier"] == "sqlite3"
-        and told["message_count"] == len(found) == sum(counts.values())
+        content["storage_identifier"] == "sqlite3"
+        and content["message_count"] == len(found) == sum(counts.values())
         and all(n == sum(name == m[0] for m in found) for name, n in counts.items())
-        and told["starting_time"]["nanoseconds_since_epoch"] == min(times)
-        and told["duration"]["nanoseconds"] == max(times) - min(times)
-        and [file["path"] for file in told["files"]] == told["relative_file_paths"]
+        and content["starting_time"]["nanoseconds_since_epoch"] == min(times)
+        and content["duration"]["nanoseconds"] == max(times) - min(times)
+        and [file["path"] for file in content["files"]] == content["relative_file_paths"]
     )
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(make_or_compare(__doc__, make_bag, compare_bags))

@@ -17,26 +17,24 @@ import sys
 import genpy
 import numpy as np
 import rosbag
-from asked import asked
+from comparison import (
+    PERIOD,
+    POINTS,
+    START,
+    make_or_compare,
+    messages_that_stay,
+    points_that_stay,
+)
 from sensor_msgs import point_cloud2
 from sensor_msgs.msg import Imu, PointCloud2, PointField
 from std_msgs.msg import Header, String
 
-POINTS = "/velodyne_points"
-PERIOD = 100_000_000
-START = 1_700_000_000_123_456_789
 
-
-def main() -> int:
-    """Makes bags, or compares two."""
-    arguments = asked(__doc__)
-    if arguments.command == "make":
-        arguments.out.mkdir(parents=True, exist_ok=True)
-        for compression in ("none", "bz2", "lz4"):
-            scans = sorted(arguments.scans.glob("*.bin"))[: arguments.number]
-            make_bag(arguments.out / f"{compression}.bag", compression, scans)
-        return 0
-    return compare_bags(arguments.before, arguments.after, arguments.masks)
+def make_bags(folder, scans):
+    """A bag of each compression."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for compression in ("none", "bz2", "lz4"):
+        make_bag(folder / f"{compression}.bag", compression, scans)
 
 
 def make_bag(path, compression, scans):
@@ -96,25 +94,15 @@ def cloud(scan, number, time):
 
 
 def compare_bags(before, after, masks):
-    """Compares message by message, and says what it found."""
-    old, new = messages(before), messages(after)
-    left = clouds(after)
-    rain = [np.fromfile(mask, "<u4") == 1 for mask in sorted(masks.glob("*.label"))]
-    kept = [points[~drops] for points, drops in zip(clouds(before), rain, strict=True)]
-    others = [(a, b) for a, b in zip(old, new, strict=False) if a[0] != POINTS]
-    findings = {
-        f"{len(old)} messages": len(old) == len(new),
-        "order, topics and stamps": [m[:2] for m in old] == [m[:2] for m in new],
+    """Compares message by message."""
+    head = "order, topics and stamps", 2
+    return {
+        **messages_that_stay(messages(before), messages(after), head),
         "connection headers": connections(before) == connections(after),
         "types, counts and compression": summary(before) == summary(after),
-        f"{len(others)} messages of other topics, byte for byte": all(a == b for a, b in others),
         "headers of clouds": headers(before) == headers(after),
-        f"{sum(map(len, left)):,} points left of {sum(map(len, rain)):,}": len(left) == len(kept)
-        and all(map(np.array_equal, left, kept)),
+        **points_that_stay(clouds(before), clouds(after), masks),
     }
-    for title, found in findings.items():
-        print(f"{before.stem:5} {'same' if found else 'DIFFERENT':10} {title}")
-    return 0 if all(findings.values()) else 1
 
 
 def messages(path):
@@ -142,13 +130,13 @@ def headers(path):
 
 
 def connections(path):
-    """What publishers say of themselves: definition, caller, latching."""
+    """What connections hold of publishers: definition, caller, latching."""
     with rosbag.Bag(str(path)) as bag:
         return sorted(sorted(each.header.items()) for each in bag._connections.values())
 
 
 def summary(path):
-    """What `rosbag info` says of topics and compression."""
+    """What `rosbag info` prints of topics and compression."""
     with rosbag.Bag(str(path)) as bag:
         types, topics = bag.get_type_and_topic_info()
         counted = {name: (topic.msg_type, topic.message_count) for name, topic in topics.items()}
@@ -157,4 +145,4 @@ def summary(path):
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(make_or_compare(__doc__, make_bags, compare_bags))

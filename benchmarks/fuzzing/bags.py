@@ -25,7 +25,7 @@ from benchmarks.fuzzing.false_indexes import (
     stating,
     with_summary,
 )
-from benchmarks.fuzzing.format_inputs import BOMB, POINTS
+from benchmarks.fuzzing.formats import BOMB, POINTS
 from benchmarks.fuzzing.mutations import damaged
 from benchmarks.fuzzing.reader import Reader
 from benchmarks.recorded_bags import (

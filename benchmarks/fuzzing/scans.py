@@ -7,7 +7,7 @@ from random import Random
 
 import numpy as np
 
-from benchmarks.fuzzing.format_inputs import INPUTS, POINTS, deflated_zeros
+from benchmarks.fuzzing.formats import INPUTS, POINTS, deflated_zeros
 from benchmarks.fuzzing.mutations import damaged
 from benchmarks.fuzzing.reader import Reader
 from derain import files
@@ -32,14 +32,12 @@ def _reader(suffix: str) -> Reader:
     """The reader of a format; of one from outside derain, what derain writes is damaged."""
     if suffix not in INPUTS:
         return Reader(suffix[1:], f"scan{suffix}", _read_scan, lambda: _written(suffix))
-    inputs = INPUTS[suffix]()
+    inputs = INPUTS[suffix]
 
     def seeds() -> list[bytes]:
-        return [*_written(suffix), *inputs.by_others(suffix)]
+        return [*_written(suffix), *inputs.by_others()]
 
-    change = inputs.own_damage()
-    hostile = inputs.hostile(suffix)
-    return Reader(suffix[1:], f"scan{suffix}", _read_scan, seeds, hostile, change)
+    return Reader(suffix[1:], f"scan{suffix}", _read_scan, seeds, inputs.hostile, inputs.own_damage)
 
 
 def _packed(reader: Reader) -> Reader:

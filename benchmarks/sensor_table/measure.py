@@ -6,13 +6,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from tqdm import tqdm
 
 from benchmarks.sensor_table.columns import Cell, Column
-from benchmarks.sensor_table.data import DataFinder
+from benchmarks.sensor_table.inputs import DataFinder, LeftOut, file_sizes, require, rows_of
 from benchmarks.sensor_table.plan import LabelledData, Plan
-from benchmarks.sensor_table.rows import LeftOut, file_sizes, require, rows_of
-from benchmarks.sensor_table.unit import factor_for
 from derain.errors import reason_of
 from derain.evaluation.counts import ratio
 from derain.evaluation.scores import Scores, score
@@ -20,10 +19,13 @@ from derain.export.bench.bench import scored_methods
 from derain.export.bench.bench_entries import BenchEntry, bench_entries
 from derain.export.bench.cost import Timing, measure_cost
 from derain.export.bench.labelled_frames import LabelledFrames
+from derain.scan import Scan
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.sources.training_record import training_overlap
 from derain.spec import Spec
+from derain.views.full_scale import full_scale
+from derain.views.scan_issues import SCALE_OF_UNIT
 
 # Titles of the columns of what methods cost.
 TIME, SIZE = "time", "file"
@@ -78,8 +80,8 @@ class Measurement:
         self, title: str, data: LabelledData, finder: DataFinder
     ) -> Iterator[BenchEntry]:
         """What has learnt places alone, of other scans of the same data."""
-        for method, asked in self.plan.methods.items():
-            if asked.is_position and not data.taken:
+        for method, row in self.plan.methods.items():
+            if row.is_position and not data.taken:
                 find = partial(finder.of_places, data)
                 others = self.left_out.unless_found(f"{method}: {title}", find)
                 if others is not None:
@@ -106,7 +108,7 @@ class Measurement:
         yield Column(title, "IoU", cells, about)
 
     def _learnt(self, row: BenchEntry, column: str, found: LabelledFrames) -> bool:
-        """Whether a method was trained on some of a column's scans: by its record, or as told."""
+        """Whether a method was trained on scans of a column, by its record or by the plan."""
         spec = row.spec_or_filter
         recorded = isinstance(spec, Spec) and training_overlap(
             row.title, spec, found.card, found.frames
@@ -133,7 +135,7 @@ class Measurement:
         for row, factor, method in zip(rows, factors, methods, strict=True):
             try:
                 called = int(method(in_unit[factor]).sum())
-            except Exception as error:  # whatever its libraries raise is told
+            except Exception as error:  # whatever its libraries raise
                 self.left_out.reasons[f"{row.title}: {frame.name}"] = reason_of(error)
             else:
                 cells[row.title] = _share(called, points)
@@ -179,3 +181,16 @@ def _most_of(clean: Sequence[Column]) -> Column:
 def _share(called: int, points: int) -> Cell:
     counts = {"points": points, "called_rain": called}
     return Cell(float(ratio(called, points)), counts=counts)
+
+
+def factor_for(spec_or_filter: object, scan: Scan) -> float:
+    """What takes a scan's intensities to the unit of a method; 1 where either has none.
+
+    Args:
+        spec_or_filter: What the method judges by: a filter, or the Spec of a model.
+        scan: The scan.
+    """
+    unit = getattr(spec_or_filter, "intensity_unit", "")
+    wanted = getattr(spec_or_filter, "FULL_SCALE", SCALE_OF_UNIT.get(unit))
+    own = full_scale([scan])
+    return wanted / own if wanted is not None and np.isfinite(own) else 1.0

@@ -9,7 +9,7 @@ import yaml
 
 
 @dataclass(frozen=True)
-class Asked:
+class Row:
     """A row: a method, named by what makes it.
 
     Attributes:
@@ -56,7 +56,7 @@ class LabelledData:
 
 @dataclass(frozen=True)
 class Plan:
-    """The rows and columns that are asked for.
+    """The rows and columns.
 
     Attributes:
         methods: The rows, by title.
@@ -66,7 +66,7 @@ class Plan:
         timed: Title of the labelled data whose first scan methods are timed on.
     """
 
-    methods: Mapping[str, Asked]
+    methods: Mapping[str, Row]
     labelled: Mapping[str, LabelledData]
     clean: tuple[str, ...]
     timed: str
@@ -77,7 +77,7 @@ class Plan:
         content = yaml.safe_load(path.read_text("utf-8"))
         return cls(
             {
-                title: Asked(method) if isinstance(method, str) else Asked(**_tuples(method))
+                title: Row(method) if isinstance(method, str) else Row(**_tuples(method))
                 for title, method in content["methods"].items()
             },
             {title: LabelledData(**_tuples(data)) for title, data in content["labelled"].items()},
@@ -85,12 +85,12 @@ class Plan:
             content["timed"],
         )
 
-    def with_methods(self, methods: Mapping[str, Asked]) -> "Plan":
+    def with_methods(self, methods: Mapping[str, Row]) -> "Plan":
         """The same plan with further rows above the others; one of the same title is replaced."""
-        others = {title: asked for title, asked in self.methods.items() if title not in methods}
+        others = {title: row for title, row in self.methods.items() if title not in methods}
         return self.with_only({**methods, **others})
 
-    def with_only(self, methods: Mapping[str, Asked]) -> "Plan":
+    def with_only(self, methods: Mapping[str, Row]) -> "Plan":
         """The same columns, of these methods alone."""
         return replace(self, methods=methods)
 

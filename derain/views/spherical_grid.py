@@ -162,17 +162,21 @@ class SphericalGrid:
             train/common/laserscan.py.
         """
         pixel = self.table(xyz)
+        # The few points near a border of pixels take trigonometry.
         unsure = np.flatnonzero(pixel < UNSURE_BELOW)
         azimuth, inclination = directions(xyz.take(unsure, axis=0))
+        # With one OUTSIDE the sum is negative, whatever the other is.
         pixel[unsure] = self._first_pixel(inclination) + self._column(azimuth)
         return np.maximum(pixel, -1, out=pixel)
 
     def _first_pixel(self, inclination: NDArray[np.float64]) -> NDArray[np.int64]:
         """First pixel of the row, int64 (N,); OUTSIDE where it is none of the grid's."""
         ascending = np.array(self.edges[::-1])
+        # Rows are counted from the top, and the lowest edge belongs to the last of them.
         row = self.rows - np.searchsorted(ascending, inclination, side="left")
+        row = np.minimum(row, self.rows - 1)
         inside = (inclination >= ascending[0]) & (inclination <= ascending[-1])
-        return np.where(inside, np.minimum(row, self.rows - 1) * self.columns, OUTSIDE)
+        return np.where(inside, row * self.columns, OUTSIDE)
 
     def _column(self, azimuth: NDArray[np.float64]) -> NDArray[np.int64]:
         """Column, int64 (N,); OUTSIDE where it is none of the grid's."""
@@ -180,12 +184,12 @@ class SphericalGrid:
         from_left = (left - azimuth) % FULL_CIRCLE
         # Multiplied before it is divided: that is exact for the usual bounds and round azimuths.
         column = (from_left * self.columns / (left - right)).astype(np.int64)
-        inside = from_left <= left - right
-        return np.where(inside, np.minimum(column, self.columns - 1), OUTSIDE)
+        column = np.minimum(column, self.columns - 1)  # the right bound belongs to the last
+        return np.where(from_left <= left - right, column, OUTSIDE)
 
     @cached_property
     def table(self) -> DirectionTable:
-        """What finds the pixels of nearly all points without trigonometry."""
+        """Finds the pixels of nearly all points, without trigonometry."""
         right, left = self.azimuth
         return DirectionTable(
             np.array(self.edges),

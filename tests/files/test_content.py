@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow
 import pytest
 
-from benchmarks.fuzzing.format_inputs import INPUTS
+from benchmarks.fuzzing.formats import INPUTS
 from derain import InputError, Scan
 from derain.evaluation.hard_cases import scene
 from derain.files import read_scan, write_scan
@@ -105,7 +105,7 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes], str]] = {
 OF_THE_FUZZER = {
     f"{suffix} {number}": (suffix, make, "scan")
     for suffix in FORMATS
-    for number, make in enumerate(INPUTS[suffix]().hostile(suffix))
+    for number, make in enumerate(INPUTS[suffix].hostile)
 }
 # Odd numbers, and faces that are left out.
 READABLE = {".bin 0", ".bin 1", ".bin 2", ".ply 2"}

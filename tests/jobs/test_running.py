@@ -87,6 +87,12 @@ def test_other_options_are_refused_and_named(out: Path) -> None:
     assert next(anew.records_of(UNITS)) == (UNITS[0], None)
 
 
+def test_a_record_of_other_options_does_not_count(out: Path) -> None:
+    results(out, Counting(out))
+    other = replace(begun(out), options={**OPTIONS, "size": 4})
+    assert [record for _, record in other.records_of(UNITS)] == [None] * len(UNITS)
+
+
 def test_a_unit_that_kills_its_process_is_passed_over_after_three_tries(out: Path) -> None:
     with WorkerPool(2) as pool:
         found = results(out, Counting(out, killing=("drive/1",)), pool)

@@ -11,6 +11,7 @@ import pytest
 from derain.errors import InputError, ScanWarning
 from derain.export.recorded import RecordedDerainer, added_log_odds
 from derain.export.runtime import Derainer
+from derain.files.extrinsics import Extrinsics
 from derain.recordings.rays import RayEvidence
 from derain.scan import Scan
 from derain.sources.frame import MemoryFrame
@@ -75,7 +76,9 @@ def test_without_anything_to_go_by_it_is_the_model(model: Derainer) -> None:
     jumps = [frames[0], replace(frames[1], sensor_to_world=turned), frames[2]]
     repeats = [replace(frames[0], number=n, key=str(n)) for n in range(3)]
     apart = [replace(frame, sequence=str(n)) for n, frame in enumerate(frames)]
-    for recording in (frames[:1], repeats, apart, jumps[:2]):
+    askew = frames[1].sensor_to_world @ Extrinsics.of_pose(0, 0, 0, 0, 0, 30).matrix
+    wrong = [frames[0], replace(frames[1], sensor_to_world=askew)]
+    for recording in (frames[:1], repeats, apart, jumps[:2], wrong):
         for judgement in judged(model, recording):
             alone = model.judge(judgement.scan)
             np.testing.assert_array_equal(judgement.probability, alone.probability)

@@ -175,6 +175,13 @@ def test_faces_of_vertices_that_stay_are_renumbered(
     assert read_scan(path).header.faces.table["red"].tolist() == [1, 2]
 
 
+def test_faces_of_another_cloud_are_not_written(file: Path) -> None:
+    file.write_bytes(mesh(TRIANGLES, "ascii"))
+    of_mesh = read_scan(file)
+    write_scan(file, Scan(of_mesh.xyz[:2], header=of_mesh.header))
+    assert b"face" not in file.read_bytes()
+
+
 def test_faces_follow_vertices_in_any_order_and_the_first_of_those_taken_twice(
     tmp_path: Path,
 ) -> None:

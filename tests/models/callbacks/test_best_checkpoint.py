@@ -117,15 +117,19 @@ def test_the_best_epochs_are_those_of_an_unbroken_run(
 
 
 @pytest.mark.parametrize(
-    "named", ["../precious.ckpt", "notes.txt", "other.ckpt", "..", "../../precious.ckpt"]
+    ("named", "filename"),
+    [
+        *(("../precious.ckpt", "best"), ("notes.txt", "best"), ("other.ckpt", "best")),
+        *(("..", "best"), ("../../precious.ckpt", "best"), ("../precious.ckpt", "{epoch}")),
+    ],
 )
 @pytest.mark.parametrize("folder", ["runs/first", "runs/second"])
 def test_no_file_is_lost_that_a_checkpoint_names(
-    fit: Fit, tmp_path: Path, folder: str, named: str
+    fit: Fit, tmp_path: Path, folder: str, named: str, filename: str
 ) -> None:
     scores = (1.0, 2.0, 3.0)
     run = tmp_path / "runs/first"
-    fit("runs/first", 1, scores, mode="max")
+    fit("runs/first", 1, scores, mode="max", filename=filename)
     precious = [tmp_path / "precious.ckpt", tmp_path / "runs/precious.ckpt"]
     precious += [run / "notes.txt", run / "other.ckpt"]
     for file in precious:
@@ -136,9 +140,9 @@ def test_no_file_is_lost_that_a_checkpoint_names(
         state.update(best_model_path=path, kth_best_model_path=path, last_model_path=path)
         state.update(best_k_models={path: torch.tensor(0.5)})
     torch.save(content, run / "last.ckpt")
-    fit(folder, 3, scores, earlier="runs/first", mode="max")
+    best = fit(folder, 3, scores, earlier="runs/first", mode="max", filename=filename)
     assert [file.read_text() for file in precious] == ["precious"] * len(precious)
-    assert torch.load(tmp_path / folder / "best.ckpt", weights_only=True)["epoch"] == 2
+    assert torch.load(best.best_model_path, weights_only=True)["epoch"] == 2
 
 
 def test_a_run_that_goes_on_in_its_folder_replaces_what_it_has_kept(
