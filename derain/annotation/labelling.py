@@ -1,7 +1,8 @@
 """Labels the scans of one unit by a method, and counts the labels."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +15,12 @@ from derain.errors import InputError
 from derain.evaluation.answers import NOT_KNOWN, TEACHERS_ANSWERS, Answers
 from derain.evaluation.truth_record import TruthRecord
 from derain.files.labels import write_labels
-from derain.files.reading import reading
+from derain.jobs.running import IsThere
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
-from derain.sources.judging import Answer
 from derain.sources.unit_judging import UnitJudging
 from derain.sources.units import FrameUnit
+from derain.system.stopwatch import Stopwatch
 from derain.views.scan_issues import ScanIssue, much_removed
 
 # Class ids of a teacher's answers.
@@ -64,6 +65,16 @@ class LabelledScan:
         """Whether anything is known of it."""
         return bool(self.answers.table[:, :NOT_KNOWN].any())
 
+    def to_json(self) -> dict[str, Any]:
+        """The counts as the record of the scan's unit has them."""
+        return {
+            "key": self.frame.key,
+            "number": self.frame.number,
+            "answers": self.answers.table.tolist(),
+            "milliseconds": dict(self.milliseconds),
+            "truth": None if self.truth is None else [cells.tolist() for cells in self.truth],
+        }
+
 
 @dataclass(frozen=True)
 class Labelling(UnitJudging[LabelledScan]):
@@ -80,51 +91,35 @@ class Labelling(UnitJudging[LabelledScan]):
 
     def do(self, unit: FrameUnit) -> Iterator[LabelledScan]:
         """Labels the scans of a unit."""
-        for frame, answer in self.judged(unit.map(Frame.without_labels)):
-            if isinstance(answer, InputError):
-                yield LabelledScan(frame, error=answer)
-                continue
-            try:
-                with reading(Path(frame.name)):  # which names the file where the memory is full
-                    labelled = self._labelled(unit.by_key[frame.key], answer)
-            except InputError as error:
-                labelled = LabelledScan(frame, error=error)
-            yield labelled
+        placed, doubts = self.placed(unit)
+        for labelled in self.results(placed.of(_without_labels), partial(self._labelled, placed)):
+            issues = [*doubts.get(labelled.frame.key, ()), *labelled.issues]
+            yield replace(labelled, issues=issues)
 
-    def is_there(self, unit: FrameUnit) -> bool:
-        """Whether all scans of the unit have labels."""
-        return all(label_path(self.folder, frame.key).exists() for frame in unit.frames)
+    def look(self) -> IsThere[FrameUnit, LabelledScan]:
+        """Whether all scans of a unit have labels."""
+        return lambda unit, labelled: all(
+            label_path(self.folder, frame.key).exists() for frame in unit.frames
+        )
 
-    def failed(self, unit: FrameUnit, error: InputError) -> Iterator[LabelledScan]:
-        """The result of a unit that failed as a whole, which is that of its first scan."""
-        yield LabelledScan(unit.frames[0], error=error)
-
-    def error_of(self, result: LabelledScan) -> InputError | None:
-        """Why a scan has no labels."""
-        return result.error
-
-    def to_json(self, result: LabelledScan) -> dict[str, Any]:
-        """The counts of a scan as a record has them."""
-        return {
-            "key": result.frame.key,
-            "answers": result.answers.table.tolist(),
-            "milliseconds": dict(result.milliseconds),
-            "truth": None if result.truth is None else [cells.tolist() for cells in result.truth],
-        }
+    def failure(self, frame: Frame, error: InputError) -> LabelledScan:
+        """The result of a scan that has no labels."""
+        return LabelledScan(frame, error=error)
 
     def from_json(self, unit: FrameUnit, written: dict[str, Any]) -> LabelledScan:
         """The counts of a scan from its record."""
         truth = written["truth"]
         return LabelledScan(
-            unit.by_key[written["key"]],
+            replace(unit.by_key[written["key"]], number=written["number"]),
             Answers(np.array(written["answers"], np.int64)),
             written["milliseconds"],
             None if truth is None else [np.array(cells, np.int64) for cells in truth],
         )
 
-    def _labelled(self, frame: Frame, answer: Answer) -> LabelledScan:
-        _, judgement, stopwatch = answer
-        labels = labels_of(judgement)
+    def _labelled(
+        self, unit: FrameUnit, unlabelled: Frame, judgement: Judgement, stopwatch: Stopwatch
+    ) -> LabelledScan:
+        frame, labels = unit.by_key[unlabelled.key], labels_of(judgement)
         write_labels(label_path(self.folder, frame.key), labels)
         issues = [*self.method.issues(judgement), *much_removed(judgement.share_of_rain)]
         truth = None
@@ -135,6 +130,10 @@ class Labelling(UnitJudging[LabelledScan]):
                 issues.append(ScanIssue("own labels not measured", f"not measured: {error}"))
         answers = Answers.of(judgement.scan.with_label(labels), TAUGHT_CARD)
         return LabelledScan(frame, answers, dict(stopwatch.milliseconds), truth, issues)
+
+
+def _without_labels(frames: Sequence[Frame]) -> list[Frame]:
+    return [frame.without_labels() for frame in frames]
 
 
 def labels_of(judgement: Judgement) -> NDArray[np.uint32]:

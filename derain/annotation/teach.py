@@ -25,7 +25,7 @@ from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.files.atomic import replacing
 from derain.files.labels import LABEL
-from derain.jobs.job import FOLDER, Job
+from derain.jobs.job import FOLDER
 from derain.jobs.running import Submits, Task, completed, run
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
@@ -33,7 +33,8 @@ from derain.sources.judging import Guard, unguarded
 from derain.sources.method import Method
 from derain.sources.sink import FolderSink, LabelSink
 from derain.sources.source import Source
-from derain.sources.units import Division, FrameUnit, units_of, whole
+from derain.sources.unit_judging import Placing
+from derain.sources.units import Division, units_of, whole
 
 # The folder of the labels until all of them are known.
 UNFINISHED = ".unfinished"
@@ -51,6 +52,7 @@ def teach(
     watch: Watch = lambda scan: None,
     division: Division | None = None,
     executor: Submits | None = None,
+    placing: Placing | None = None,
 ) -> Manifest:
     """Labels recordings: 0 is not rain, 1 rain, 255 not known.
 
@@ -71,6 +73,8 @@ def teach(
             on. None keeps no records.
         executor: Does the units: an executor of :mod:`concurrent.futures` or the like, whose
             processes find all files by the same paths. None does them in this process.
+        placing: Finds where the scans of whole recordings were taken; see
+            :func:`derain.sources.cleaning.clean`.
 
     Returns:
         The manifest. It is not finished, and nothing is in its place, while other shards of the
@@ -87,42 +91,25 @@ def teach(
     if division is not None and division.keeps_records(source, out):
         place = out.absolute()  # other processes may work in another folder
         # The labels of all scans stay there, and are linked to where they belong.
-        work = Labelling(method, fingerprint, place / FOLDER, card)
+        work = Labelling(method, fingerprint, placing, place / FOLDER, card)
         options = work.options("teach", source, division.block)
         options["card"] = None if card is None else card.name
-        task = Task(Job.begin(place, options, division.shard, division.anew), work)
-        units = units_of(source, method, division.block)
-        task.job.list_units(units)
-        frames = _by_units(task, units, division, executor, guard, watch)
-        if frames is None:
-            return Manifest(method.as_dict(), finished=False)
+        block = division.block if placing is None else len(source)  # whole recordings
+        units = units_of(source, method, block)
+        job, shard = division.begin(place, options, units)
+        task = Task(job, work)
+        results = (each.result for each in run(task, shard, executor))
+        frames = _known(results, sum(len(unit.frames) for unit in shard), guard, watch)
+        if division.shard is not None:
+            scans = completed(task, units)
+            if scans is None:
+                return Manifest(method.as_dict(), finished=False)
+            frames = [scan.frame for scan in scans if scan.is_known]
         return _finish(work, out, frames)
     with _unfinished(out) as folder:
-        work = Labelling(method, fingerprint, folder, card)
+        work = Labelling(method, fingerprint, placing, folder, card)
         frames = _known(work.do(whole(source)), len(source), guard, watch)
         return _finish(work, out, frames)
-
-
-def _by_units(
-    task: Task[FrameUnit, LabelledScan],
-    units: list[FrameUnit],
-    division: Division,
-    executor: Submits | None,
-    guard: Guard,
-    watch: Watch,
-) -> list[Frame] | None:
-    """Labels the units that are not done.
-
-    Returns:
-        The frames of which something is known; None while other shards are to be done.
-    """
-    shard = task.job.shard_of(units, division.shard)
-    results = (each.result for each in run(task, shard, executor))
-    frames = _known(results, sum(len(unit.frames) for unit in shard), guard, watch)
-    if division.shard is None:
-        return frames
-    scans = completed(task, units)
-    return None if scans is None else [scan.frame for scan in scans if scan.is_known]
 
 
 def _known(scans: Iterator[LabelledScan], total: int, guard: Guard, watch: Watch) -> list[Frame]:

@@ -18,9 +18,9 @@ import json
 from derain.cli.outputs import print_lines
 from derain.cli.parser import Parser
 from derain.jobs.job import Job
-from derain.jobs.record import Record
 from derain.jobs.status import JobStatus, job_status
-from derain.sources.cleaned_totals import CleanedTotals
+from derain.jobs.unit import Record
+from derain.sources.cleaned_scan import CleanedTotals
 from derain.stores.url import place_of
 
 # At most so many failed units are printed with their reasons.

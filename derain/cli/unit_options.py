@@ -9,7 +9,10 @@ from derain.errors import InputError
 from derain.jobs.running import Submits
 from derain.jobs.shard import TASK, Shard
 from derain.jobs.workers import processes
-from derain.sources.units import BLOCK, Division
+from derain.recordings.posed import ODOMETRY, Odometry, with_poses
+from derain.sources.method import Method
+from derain.sources.source import Source
+from derain.sources.units import BLOCK, Division, spans_of
 from derain.system.cores import threads_of
 from derain.system.memory import total_memory
 from derain.system.notices import warn
@@ -122,6 +125,44 @@ def workers_of(arguments: argparse.Namespace, count_units: Callable[[], int]) ->
     cores = threads_of(arguments.threads)
     fitting = min(cores, total_memory() // MEMORY_OF_WORKER)
     return fitting if fitting > 1 and count_units() >= UNITS_OF_WORKER * fitting else 1
+
+
+def share_threads(arguments: argparse.Namespace, workers: int) -> bool:
+    """Divides the threads of the arguments between workers; returns whether there are several.
+
+    A worker of Dask does a unit in each of its threads: it has one thread, unless others are named.
+
+    Args:
+        arguments: The options, whose threads are changed.
+        workers: Number of processes of this machine.
+    """
+    if workers == 1 and arguments.dask is None:
+        return False
+    shared = 1 if arguments.dask and not arguments.threads else threads_of(arguments.threads)
+    arguments.threads = max(shared // workers, 1)
+    return True
+
+
+def with_given_poses(source: Source, arguments: argparse.Namespace) -> Source:
+    """The scans with the poses that the arguments name, but for those of odometry.
+
+    Raises:
+        InputError: Poses that cannot be read or do not fit the scans.
+    """
+    if arguments.poses in (None, ODOMETRY):
+        return source
+    return with_poses(source, arguments.poses)
+
+
+def odometry_of(arguments: argparse.Namespace) -> Odometry | None:
+    """What finds the poses in the process that does a unit; None where they are not to be found."""
+    return Odometry(arguments.threads) if arguments.poses == ODOMETRY else None
+
+
+def count_units(source: Source, method: Method, arguments: argparse.Namespace) -> int:
+    """Number of units; odometry takes whole recordings."""
+    block = len(source) if arguments.poses == ODOMETRY else arguments.block
+    return len(spans_of(source, method, block))
 
 
 @contextmanager

@@ -13,9 +13,8 @@ from hashlib import sha256
 from typing import Any, Self, TypeVar
 
 from derain.errors import InputError
-from derain.jobs.record import Record
 from derain.jobs.shard import Shard
-from derain.jobs.unit import Unit
+from derain.jobs.unit import Record, Unit
 from derain.stores.documents import Documents, documents_at
 from derain.stores.url import Place, without_secrets
 
@@ -43,13 +42,19 @@ class Job:
 
     @classmethod
     def begin(
-        cls, folder: Place, options: Mapping[str, Any], shard: Shard | None, anew: bool = False
+        cls,
+        folder: Place,
+        options: Mapping[str, Any],
+        units: Sequence[Unit],
+        shard: Shard | None = None,
+        anew: bool = False,
     ) -> Self:
         """Begins a job, or goes on with the one of the folder.
 
         Args:
             folder: The folder of the results, made if missing.
             options: The options.
+            units: All of its units, which are listed for :meth:`listed`.
             shard: The shard that is done now; None for all of it.
             anew: Whether the records of another job are removed; its results stay until they are
                 written anew.
@@ -69,6 +74,8 @@ class Job:
         ours._documents.create(JOB, json.dumps(written, indent=1))
         begun = cls.at(folder)  # another command may have been quicker
         ours._refuse_other(begun)
+        listed = [[unit.id, unit.size, unit.inputs] for unit in units]
+        begun._documents.write(UNITS, json.dumps(listed))
         return begun
 
     @classmethod
@@ -103,15 +110,6 @@ class Job:
     def fingerprint(self) -> str:
         """Of its options, 16 hexadecimal digits."""
         return sha256(json.dumps(self.options, sort_keys=True).encode()).hexdigest()[:16]
-
-    def list_units(self, units: Sequence[Unit]) -> None:
-        """Writes which units there are, for :meth:`listed`.
-
-        Raises:
-            InputError: They cannot be written.
-        """
-        listed = [[unit.id, unit.size, unit.inputs] for unit in units]
-        self._documents.write(UNITS, json.dumps(listed))
 
     def shard_of(self, units: list[UnitT], shard: Shard | None) -> list[UnitT]:
         """The units of a shard, in their order.

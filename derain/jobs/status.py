@@ -5,9 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from derain.jobs.job import Job
-from derain.jobs.record import Record
 from derain.jobs.shard import array_expression, shard_numbers
-from derain.jobs.unit import Unit
+from derain.jobs.unit import Record, Unit
 from derain.stores.url import Place
 
 

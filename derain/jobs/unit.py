@@ -1,6 +1,12 @@
-"""A part of a job that one process does by itself."""
+"""A part of a job that one process does by itself, and the record of what was done of it."""
 
+import os
+import platform
 from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any, Self
+
+from derain.errors import InputError
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -17,3 +23,54 @@ class Unit:
     id: str
     size: int
     inputs: str
+
+
+@dataclass(frozen=True)
+class Record:
+    """What was done of a unit.
+
+    Attributes:
+        unit: Id of the unit.
+        inputs: Fingerprint of what it read.
+        options: Fingerprint of the options of its job.
+        worker: Host and number of the process.
+        ended: When it ended, in ISO 8601, by the clock of its worker.
+        seconds: How long it took.
+        errors: What went wrong, as subject, reason and remedy each; empty where nothing did.
+        results: What came of it, as the job writes it.
+    """
+
+    unit: str
+    inputs: str
+    options: str
+    worker: str
+    ended: str
+    seconds: float
+    errors: list[list[str]]
+    results: list[Any]
+
+    @classmethod
+    def of(
+        cls,
+        unit: Unit,
+        options: str,
+        seconds: float,
+        errors: list[InputError],
+        results: list[Any],
+    ) -> Self:
+        """The record of a unit that ends now, in this process."""
+        return cls(
+            unit=unit.id,
+            inputs=unit.inputs,
+            options=options,
+            worker=f"{platform.node()}-{os.getpid()}",
+            ended=datetime.now(UTC).isoformat(timespec="seconds"),
+            seconds=round(seconds, 3),
+            errors=[[str(each.subject), each.reason, each.remedy] for each in errors],
+            results=results,
+        )
+
+    @property
+    def failures(self) -> list[InputError]:
+        """What went wrong."""
+        return [InputError(*error) for error in self.errors]

@@ -14,6 +14,8 @@ from derain.bags.names import ROS1_SUFFIX, stem
 from derain.errors import InputError
 from derain.scan import Scan
 from derain.sources.file_frame import FileFrame
+from derain.sources.records import poses_along
+from derain.sources.trajectory import Trajectory
 from derain.stores.mirror import Mirror, mirror
 from derain.stores.objects import StoredObject
 from derain.stores.url import path_of
@@ -48,7 +50,7 @@ class StoredFrame(FileFrame):
 
     def stamp(self) -> str:
         """Sizes and versions of its objects."""
-        return " ".join(f"{stored.size}-{stored.version}" for stored in self.objects)
+        return " ".join(stored.stamp for stored in self.objects)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -131,11 +133,13 @@ class StoredBag(StoredFrame):
         inner: The topic, as a part of a path; empty where the bag has only one of clouds.
         by_name: Whether keys of clouds begin with the stem of the bag.
         seconds: When the cloud was taken that it stands for; None where it stands for all.
+        trajectory: Poses of the clouds, where they are given.
     """
 
     inner: str = ""
     by_name: bool = False
     seconds: float | None = None
+    trajectory: Trajectory | None = None
 
     @property
     def suffix(self) -> str:
@@ -157,7 +161,7 @@ class StoredBag(StoredFrame):
         from derain.sources.bag_frame import bag_frames
 
         clouds = bag_frames(where.root / self.path / self.inner, by_name=self.by_name)
-        return [
+        frames: list[FileFrame] = [
             replace(
                 cloud,
                 path=cloud.path.relative_to(where.root),
@@ -166,6 +170,15 @@ class StoredBag(StoredFrame):
             )
             for cloud in clouds
         ]
+        if self.trajectory is None:
+            return frames
+        poses = poses_along(frames, self.trajectory)
+        return [frame.with_pose(pose) for frame, pose in zip(frames, poses, strict=True)]
+
+    def stamp(self) -> str:
+        """Sizes and versions of its objects, and a fingerprint of the poses that are given."""
+        given = "" if self.trajectory is None else self.trajectory.fingerprint()
+        return f"{super().stamp()} {given}"
 
     def cloud(self, key: str, name: str, seconds: float | None) -> Self:
         """One of its clouds, of which only that is known.

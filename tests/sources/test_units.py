@@ -119,7 +119,8 @@ class Failing(Between):
 
     def _judged(self, ready: FrameInWindow) -> Judgement:
         if ready.frame.number in self.bad:
-            raise derain.InputError("network", f"fails at {ready.frame.number}", "Mend it.")
+            with ready.naming_errors():
+                raise derain.InputError("network", f"fails at {ready.frame.number}", "Mend it.")
         return super()._judged(ready)
 
 
@@ -142,11 +143,14 @@ def test_each_scan_of_a_unit_has_one_outcome_whichever_fail(
 ) -> None:
     method = Failing(past, delay, bad)
     for unit in units_of(standing, method, block):
-        judging = UnitCleaning(method, "", Destination("out", None, False, BagOptions()), 1.0, None)
+        out = Destination("out", None, False, BagOptions())
+        judging = UnitCleaning(method, "", None, out, 1.0, None)
         outcomes = list(judging.judged(unit))
-        assert {frame for frame, _ in outcomes} == set(unit.frames)
+        assert {frame for frame, _, _ in outcomes} == set(unit.frames)
         assert len(outcomes) == len(unit.frames)
-        failed = {frame.number for frame, each in outcomes if isinstance(each, derain.InputError)}
+        errors = {frame: each for frame, each, _ in outcomes if isinstance(each, derain.InputError)}
+        assert all(error.subject == frame.name for frame, error in errors.items())
+        failed = {frame.number for frame in errors}
         assert failed == bad & {frame.number for frame in unit.frames}
 
 
