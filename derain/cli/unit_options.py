@@ -17,6 +17,9 @@ from derain.system.cores import threads_of
 from derain.system.memory import total_memory
 from derain.system.notices import warn
 
+# The options that :func:`add_units` declares: how the work is divided changes no result.
+UNIT_OPTIONS = ("workers", "dask", "shard", "resume", "anew", "block")
+
 # A worker has at least so many units where there are several workers unasked: none waits for long.
 UNITS_OF_WORKER = 4
 
@@ -24,12 +27,17 @@ UNITS_OF_WORKER = 4
 MEMORY_OF_WORKER = 2 * 10**9
 
 
-def add_units(parser: argparse.ArgumentParser) -> None:
-    """Declares the options of commands that judge many scans."""
+def add_units(
+    parser: argparse.ArgumentParser, workers: str = "one per thread for many scans, else 1"
+) -> None:
+    """Declares the options of commands that judge many scans.
+
+    Args:
+        parser: The command's parser.
+        workers: How many processes there are by default.
+    """
     group = parser.add_argument_group("many scans")
-    add_executor(
-        group, "processes, which share the threads (default: one per thread for many scans, else 1)"
-    )
+    add_executor(group, f"processes, which share the threads (default: {workers})")
     add_shard(group)
     group.add_argument(
         "--resume",

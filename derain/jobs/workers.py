@@ -4,7 +4,7 @@ import multiprocessing
 import pickle
 import signal
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
@@ -19,7 +19,6 @@ from derain.system.workers import end_with_parent, without_main_module
 TRIES = 3
 
 Given = ParamSpec("Given")
-Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
@@ -35,23 +34,6 @@ def processes(count: int) -> Iterator["WorkerPool | None"]:
     else:
         with WorkerPool(count) as pool:
             yield pool
-
-
-def each_by(
-    workers: int, work: Callable[[Item], Result], items: Sequence[Item]
-) -> Iterator[Result]:
-    """Has work done on each item, without records; yields the results in the order of the items.
-
-    Args:
-        workers: Number of processes; one is this process.
-        work: What is done.
-        items: What it is done on.
-
-    Raises:
-        InputError: A process always dies; or what the work raises.
-    """
-    with processes(workers) as pool:
-        yield from map(work, items) if pool is None else pool.map(work, items)
 
 
 class WorkerPool(ThreadPoolExecutor):

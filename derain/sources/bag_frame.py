@@ -72,8 +72,9 @@ class BagFrame(FileFrame):
             return sum(map(file_size, self._files())) // max(len(self.clouds), 1)
 
     def stamp(self) -> str:
-        """Size and time of change of the files of its bag, and its place in it."""
-        return " ".join([*map(stamp_of, self._files()), self.clouds.topic.name, str(self.number)])
+        """Size and time of change of the files of its bag and its labels; its place in the bag."""
+        place = [self.clouds.topic.name, str(self.number)]
+        return " ".join([*map(stamp_of, self._files()), *place]) + self._label_stamp()
 
     def _files(self) -> list[Path]:
         """The files of its bag."""

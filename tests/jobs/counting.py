@@ -17,12 +17,14 @@ class Counting(ValueWork[Unit]):
         folder: Where to.
         failing: Ids of units that cannot be done.
         killing: Ids of units that kill their process.
+        killing_once: Ids of those that kill it the first time.
         unfit: Whether no process can do the work.
     """
 
     folder: Path
     failing: tuple[str, ...] = ()
     killing: tuple[str, ...] = ()
+    killing_once: tuple[str, ...] = ()
     unfit: bool = False
 
     def check(self) -> None:
@@ -30,9 +32,11 @@ class Counting(ValueWork[Unit]):
             raise InputError("model.onnx", "there is no such file", "Copy it.")
 
     def value(self, unit: Unit) -> str:
-        with (self.folder / f"{unit.id}.tries").open("a") as tries:
-            tries.write("tried\n")
-        if unit.id in self.killing:
+        tries = self.folder / f"{unit.id}.tries"
+        first = not tries.exists()
+        with tries.open("a") as lines:
+            lines.write("tried\n")
+        if unit.id in self.killing or (first and unit.id in self.killing_once):
             os._exit(9)
         if unit.id in self.failing:
             raise InputError(unit.id, "is broken", "Mend it.")
