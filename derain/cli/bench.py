@@ -9,6 +9,7 @@ Writes a table (bench.md, bench.csv, bench.json) and a plot of error against tim
   derain bench --data scans/ --card wads --methods outdet.onnx --runtime openvino \
       --precision bf16 --out bench
   derain bench --data test/ --train train/ --card wads --methods position intensity --out bench
+  derain bench --data drives/ --methods default dror none --workers 8 --out bench
   derain bench --paper table2 --data REHEARSE3D_PUBLIC --methods outdet.onnx salsanext.onnx \
       lisnownet.onnx dsor.yaml dror.yaml position all none --out table2
   derain bench --paper table3 --data REHEARSE3D_PUBLIC --rain-rates rates.yaml \

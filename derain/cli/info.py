@@ -6,6 +6,8 @@ folder of sequences as of REHEARSE-3D, SemanticKITTI or WADS, or simulated; one 
 folder of scans) it counts scans and points by class and rain rate. With --grid it fits one grid to
 all scans, for a configuration. `derain info default` prints the card of the model that comes with
 derain: what it is, how good it is, and when not to use it.
+Many scans are counted by processes (--workers), a Dask cluster (--dask) or shards (--shard). With
+--out derain keeps records: what was stopped goes on, and `derain status` prints how far it is.
 
   derain info default
   derain info scan.bin
@@ -18,6 +20,7 @@ derain: what it is, how good it is, and when not to use it.
   derain info drive.mcap/velodyne_points/000012
   derain info REHEARSE3D_PUBLIC --picture statistics.png
   derain info WADS --json
+  derain info drives/ --out counts --workers 8
   derain info my_data --layout lidar,classes --card my_card.yaml
 """
 

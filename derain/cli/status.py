@@ -1,14 +1,14 @@
-"""Prints how far a run, simulate or teach is: done, failed and missing units, and totals of a run.
+"""Prints how far a command over many scans is: done, failed and missing units, totals of a run.
 
   derain status cleaned
   derain status worlds --json
   derain status s3://bucket/cleaned
 
 A unit is a recording, a bag, or a block of scans of a long recording; of simulate it is a sequence.
-Runs of more than 50 scans keep a record of each unit in the folder of --out, and so do runs by
-several processes or machines; simulate and teach always do. A failed unit is done again by the same
-command, and so is a missing one. For shards of a SLURM array, the last line has the tasks that are
-to be run again.
+run, teach and bench keep a record of each unit in the folder of --out where there are more than 50
+scans, several processes or machines; simulate always does, and info where --out names a folder. A
+failed unit is done again by the same command, and so is a missing one. For shards of a SLURM array,
+the last line has the tasks that are to be run again.
 The exit code is 2 unless all units are done.
 """
 
