@@ -130,10 +130,7 @@ def main(arguments: argparse.Namespace) -> int:
     effort = Effort(arguments.threads, arguments.timed, arguments.repeats, arguments.seed)
 
     division, workers = division_of(arguments), arguments.workers or 1
-    options = vars(arguments).items()
-    command = command_line(
-        argparse.Namespace(**{name: value for name, value in options if name not in UNIT_OPTIONS})
-    )
+    command = command_line(arguments, without=UNIT_OPTIONS)
     share_threads(arguments, workers)
 
     def bench(frames: Sequence[Frame], out: Path) -> "Bench | None":

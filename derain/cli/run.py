@@ -65,13 +65,11 @@ from derain.cli.outputs import exit_code, noting_progress, print_error, print_fa
 from derain.cli.parser import Parser
 from derain.cli.unit_options import (
     add_units,
-    count_units,
     division_of,
     executor_of,
+    method_and_workers,
     odometry_of,
-    share_threads,
     with_given_poses,
-    workers_of,
 )
 from derain.cli.weather_options import (
     add_weather,
@@ -170,10 +168,12 @@ def main(arguments: argparse.Namespace) -> int:
         require_probabilities(alone, source)
     # How many clouds a bag in a store has is known when it is fetched.
     several = len(source) > 1 or isinstance(source[0], StoredBag)
-    method = _over_recording(alone, arguments, several)
-    workers = workers_of(arguments, lambda: count_units(source, method, arguments))
-    if share_threads(arguments, workers):
-        method = _over_recording(method_of(name, arguments), arguments, several)
+    method, workers = method_and_workers(
+        _over_recording(alone, arguments, several),
+        lambda: _over_recording(method_of(name, arguments), arguments, several),
+        source,
+        arguments,
+    )
     weather = weather_options(arguments)
     sink = CleanSink(
         arguments.out,

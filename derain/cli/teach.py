@@ -38,13 +38,11 @@ from derain.cli.outputs import exit_code, print_error, print_facts, print_lines
 from derain.cli.parser import Parser
 from derain.cli.unit_options import (
     add_units,
-    count_units,
     division_of,
     executor_of,
+    method_and_workers,
     odometry_of,
-    share_threads,
     with_given_poses,
-    workers_of,
 )
 from derain.evaluation.counts import or_none
 from derain.evaluation.text_tables import number_text
@@ -96,9 +94,9 @@ def main(arguments: argparse.Namespace) -> int:
     source = with_given_poses(found, arguments).map(
         lambda frame: frame.with_intensity_times(arguments.intensity_scale)
     )
-    workers = workers_of(arguments, lambda: count_units(source, method, arguments))
-    if share_threads(arguments, workers):
-        method = over_recording(method_of(name, arguments))
+    method, workers = method_and_workers(
+        method, lambda: over_recording(method_of(name, arguments)), source, arguments
+    )
     failures = Failures(print_error)
     with executor_of(arguments, workers) as executor:
         results = teach_recordings(

@@ -167,10 +167,20 @@ def odometry_of(arguments: argparse.Namespace) -> Odometry | None:
     return Odometry(arguments.threads) if arguments.poses == ODOMETRY else None
 
 
-def count_units(source: Source, method: Method, arguments: argparse.Namespace) -> int:
-    """Number of units; odometry takes whole recordings."""
+def method_and_workers(
+    method: Method, remake: Callable[[], Method], source: Source, arguments: argparse.Namespace
+) -> tuple[Method, int]:
+    """The method with the threads of a worker, and the number of workers.
+
+    Args:
+        method: The method with the threads of the arguments.
+        remake: Makes it again, of changed arguments.
+        source: The scans.
+        arguments: The options.
+    """
     block = len(source) if arguments.poses == ODOMETRY else arguments.block
-    return len(spans_of(source, method, block))
+    workers = workers_of(arguments, lambda: len(spans_of(source, method, block)))
+    return (remake() if share_threads(arguments, workers) else method), workers
 
 
 @contextmanager

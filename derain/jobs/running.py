@@ -1,5 +1,6 @@
 """Does the units of a job, here or by an executor, and passes over those that are done."""
 
+import os
 import pickle
 import platform
 import threading
@@ -9,6 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar, cast
 
@@ -200,8 +202,17 @@ class Task(Generic[UnitT, ResultT]):
         if self.job is None:
             return
         errors = [each.error for each in results if each.error is not None]
-        written = [each.to_json() for each in results if each.error is None]
-        self.job.record(Record.of(unit, self.job.fingerprint, seconds, errors, written))
+        record = Record(
+            unit=unit.id,
+            inputs=unit.inputs,
+            options=self.job.fingerprint,
+            worker=f"{platform.node()}-{os.getpid()}",
+            ended=datetime.now(UTC).isoformat(timespec="seconds"),
+            seconds=round(seconds, 3),
+            errors=[[str(error.subject), error.reason, error.remedy] for error in errors],
+            results=[each.to_json() for each in results if each.error is None],
+        )
+        self.job.record(record)
 
 
 @dataclass(frozen=True)
@@ -318,16 +329,16 @@ def _by(
         future = executor.submit(do_unit, pickled, unit) if done is None else None
         waiting.append((unit, done, future))
         while waiting and (len(waiting) > AHEAD or waiting[0][2] is None or waiting[0][2].done()):
-            yield from _results(task, *waiting.popleft())
+            yield from _next_results(task, waiting)
     while waiting:
-        yield from _results(task, *waiting.popleft())
+        yield from _next_results(task, waiting)
 
 
-def _results(
-    task: Task[UnitT, ResultT], unit: UnitT, done: list[ResultT] | None, future: Any
+def _next_results(
+    task: Task[UnitT, ResultT], waiting: deque[tuple[UnitT, list[ResultT] | None, Any]]
 ) -> Iterator[UnitResult[UnitT, ResultT]]:
-    results = _awaited(task, unit, future) if done is None else done
-    for result in results:
+    unit, done, future = waiting.popleft()
+    for result in _awaited(task, unit, future) if done is None else done:
         yield UnitResult(unit, result, done is not None)
 
 

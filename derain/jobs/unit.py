@@ -1,10 +1,7 @@
 """A part of a job that one process does by itself, and the record of what was done of it."""
 
-import os
-import platform
 from dataclasses import dataclass
-from datetime import UTC, datetime
-from typing import Any, Self
+from typing import Any
 
 from derain.errors import InputError
 
@@ -48,27 +45,6 @@ class Record:
     seconds: float
     errors: list[list[str]]
     results: list[Any]
-
-    @classmethod
-    def of(
-        cls,
-        unit: Unit,
-        options: str,
-        seconds: float,
-        errors: list[InputError],
-        results: list[Any],
-    ) -> Self:
-        """The record of a unit that ends now, in this process."""
-        return cls(
-            unit=unit.id,
-            inputs=unit.inputs,
-            options=options,
-            worker=f"{platform.node()}-{os.getpid()}",
-            ended=datetime.now(UTC).isoformat(timespec="seconds"),
-            seconds=round(seconds, 3),
-            errors=[[str(each.subject), each.reason, each.remedy] for each in errors],
-            results=results,
-        )
 
     @property
     def failures(self) -> list[InputError]:

@@ -9,7 +9,7 @@ from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
 from queue import SimpleQueue
-from typing import Any, ParamSpec, Self, TypeVar
+from typing import Any, Self, TypeVar
 
 from derain.errors import InputError
 from derain.system.memory import keep_freed_memory
@@ -18,7 +18,6 @@ from derain.system.workers import end_with_parent, without_main_module
 # A unit is tried so often while its process dies.
 TRIES = 3
 
-Given = ParamSpec("Given")
 Result = TypeVar("Result")
 
 
@@ -56,9 +55,7 @@ class WorkerPool(ThreadPoolExecutor):
             self._idle.put(worker)
         self._ended = False
 
-    def submit(
-        self, work: Callable[Given, Result], /, *given: Given.args, **named: Given.kwargs
-    ) -> Future[Result]:
+    def submit(self, work: Callable[..., Result], /, *given: Any, **named: Any) -> Future[Result]:
         """Has work done by the next process that is idle."""
         return super().submit(self._done, pickle.dumps((work, given, named)))
 

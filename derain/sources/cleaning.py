@@ -1,7 +1,6 @@
 """Cleans the scans of a source, and reports what was done."""
 
 from collections import Counter
-from collections.abc import Iterator
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,7 +19,7 @@ from derain.sources.source import Source
 from derain.sources.stored_frame import StoredFrame
 from derain.sources.unit_cleaning import UnitCleaning
 from derain.sources.unit_judging import Placing
-from derain.sources.units import Division, FrameUnit, folder_of_paths, units_of, whole
+from derain.sources.units import Division, folder_of_paths, units_of, whole
 from derain.sources.weather_monitor import WeatherMonitor, WeatherOptions
 from derain.views.scan_issues import MOST_RAIN, ScanIssue
 
@@ -147,10 +146,12 @@ def clean(
             )
             written_to = () if opened.destination.is_stored else (opened.folder,)
             task = Task(job, work, folder_of_paths(source, *written_to))
-            outcomes = _counted(run(task, units, executor), opened)
+            outcomes, in_units = run(task, units, executor), True
         else:
             units = [whole(source)]
-            outcomes = _at_once(units[0], work, opened, observer)
+            cleaning = work.clean(units[0], opened, observer.judged)
+            outcomes = (UnitResult(units[0], outcome, before=False) for outcome in cleaning)
+            in_units = False
         scans = sum(len(unit.frames) for unit in units)
         found = Counter[str]()
         for result in tqdm(outcomes, total=scans, unit="scan", disable=None):
@@ -161,6 +162,8 @@ def clean(
                 failures.append(outcome.error)
                 observer.failed(outcome.error)
                 continue
+            if in_units:  # else the sink has written it, and counts itself
+                opened.count()
             if (measured := outcome.measured) is not None:
                 record = monitor.add(outcome.frame, measured, outcome.recording)
                 outcome = outcome.with_weather(record)
@@ -176,27 +179,9 @@ def clean(
     return CleanReport(cleaned, failures, monitor, before, not_cleaned)
 
 
-def _at_once(
-    unit: FrameUnit, work: UnitCleaning, sink: CleanSink, observer: CleaningObserver
-) -> Iterator[UnitResult[FrameUnit, ScanOutcome]]:
-    """Cleans scan after scan, without records."""
-    for outcome in work.clean(unit, sink, observer.judged):
-        yield UnitResult(unit, outcome, before=False)
-
-
 def _is_stored(source: Source, sink: CleanSink) -> bool:
     """Whether scans are read from an object store, or written to one."""
     return sink.destination.is_stored or any(isinstance(each, StoredFrame) for each in source)
-
-
-def _counted(
-    results: Iterator[UnitResult[FrameUnit, ScanOutcome]], sink: CleanSink
-) -> Iterator[UnitResult[FrameUnit, ScanOutcome]]:
-    """The same, whose written scans a sink counts that does not write them itself."""
-    for result in results:
-        if result.result.error is None:
-            sink.count()
-        yield result
 
 
 def _options(

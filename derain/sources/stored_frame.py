@@ -1,8 +1,6 @@
 """Scans and bags in object stores as frames, which are fetched to be read."""
 
 from abc import abstractmethod
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Self, TypeVar
@@ -12,6 +10,7 @@ from numpy.typing import NDArray
 
 from derain.bags.names import ROS1_SUFFIX, stem
 from derain.errors import InputError
+from derain.files import read_scan
 from derain.scan import Scan
 from derain.sources.file_frame import FileFrame
 from derain.sources.records import poses_along
@@ -83,23 +82,11 @@ class StoredScan(StoredFrame):
 
     def read(self) -> Scan:
         """Reads the scan, without labels."""
-        with self._fetched() as scan:
-            return replace(scan.read(), name=self.name)
-
-    def count_points(self) -> int:
-        """Number of points of the scan."""
-        with self._fetched() as scan:
-            return scan.count_points()
-
-    def fingerprint(self) -> str:
-        """A fingerprint of the content of its file, 16 hexadecimal digits."""
-        with self._fetched() as scan:
-            return scan.fingerprint()
-
-    def checksums(self) -> tuple[str, str | None]:
-        """SHA-256 of its file, in hexadecimal digits."""
-        with self._fetched() as scan:
-            return scan.checksums()
+        if self.file is not None:
+            return self._scan_in(self.file)
+        with mirror() as where:
+            where.fetch(self.objects)
+            return self._scan_in(where.root / self.path)
 
     def stamp(self) -> str:
         """Size and version of its object, and of the records beside it."""
@@ -109,20 +96,10 @@ class StoredScan(StoredFrame):
         """The scan in its file on this machine."""
         return [replace(self, file=where.root / self.path)]
 
-    @contextmanager
-    def _fetched(self) -> Iterator[FileFrame]:
-        """Lends the frame of its file on this machine."""
-        if self.file is not None:
-            yield self._at(self.file)
-            return
-        with mirror() as where:
-            where.fetch(self.objects)
-            yield self._at(where.root / self.path)
-
-    def _at(self, file: Path) -> FileFrame:
-        return FileFrame(
-            key=self.key, path=file, columns=self.columns, intensity_scale=self.intensity_scale
-        )
+    def _scan_in(self, file: Path) -> Scan:
+        """Reads the scan from its file on this machine."""
+        scan = read_scan(file, self.columns).with_intensity_times(self.intensity_scale)
+        return replace(scan, name=self.name)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
