@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from derain import __version__
 from derain.cards.card import DataCard, load_card
 from derain.cards.known import card_by_folders, layouts_for
 from derain.cards.layout import Layout
@@ -21,7 +20,8 @@ from derain.evaluation.text_tables import plain_table
 from derain.jobs.running import Submits, Task, values
 from derain.simulation.manifest import manifest_of
 from derain.sources.folders import find_layout
-from derain.sources.units import Division, FrameUnit, folder_of_paths, units_of
+from derain.sources.frame import Frame
+from derain.sources.units import Division, FrameUnit, folder_of_paths, shared_options, units_of
 from derain.stores.url import Place
 
 # What a data card is chosen by. Names of folders that many data sets have make it a guess.
@@ -151,26 +151,25 @@ def facts_of_folder(
     by_rain_rate = {rate: Contents() for rate in rates}
     # In this process units are of one scan, so that a progress bar counts scans.
     block = 1 if records is None and executor is None else division.block
+    frames: list[Frame] = []
     units: list[FrameUnit] = []
     rate_of_unit: list[float | None] = []
     for sequence in sequences:
         by_rain_rate[sequence.rain_rate].sequences += 1
         of_sequence = units_of(sequence.frames, None, block)
+        frames += sequence.frames
         units += of_sequence
         rate_of_unit += [sequence.rain_rate] * len(of_sequence)
-    places: list[Place] = [folder]
     job, shard = None, units
     if records is not None:
         options = {
-            "command": "info",
-            "derain": __version__,
+            **shared_options("info", frames, block),
             "folder": str(folder),
             "layout": None if layout is None else [layout.scans, layout.labels],
-            "columns": list(columns),
         }
         job, shard = division.begin(records, options, units)
-        places.append(records)
-    task = Task(job, FrameCounting(), folder_of_paths([], *places))
+    places = () if records is None else (records,)
+    task = Task(job, FrameCounting(), folder_of_paths(frames, *places))
     counted = values(task, units, shard, executor, "counting")
     if counted is None:
         return None

@@ -17,8 +17,7 @@ import json
 
 from derain.cli.outputs import print_lines
 from derain.cli.parser import Parser
-from derain.jobs.job import Job
-from derain.jobs.status import JobStatus, job_status
+from derain.jobs.job import Job, JobStatus, job_status
 from derain.jobs.unit import Record
 from derain.sources.cleaned_scan import CleanedTotals
 from derain.stores.url import place_of

@@ -6,16 +6,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-import derain
 from derain.errors import InputError
 from derain.files.reading import reading
 from derain.jobs.running import Result, Work
-from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.judging import AnswerOrError, answers
 from derain.sources.method import Method
-from derain.sources.units import FrameUnit
+from derain.sources.units import FrameUnit, shared_options
 from derain.system.stopwatch import Stopwatch
 from derain.views.scan_issues import ScanIssue
 
@@ -114,16 +112,11 @@ class UnitJudging(Work[FrameUnit, ResultT]):
             block: Scans of a block.
         """
         parameters = self.method.as_dict()
-        files = [frame for frame in source if isinstance(frame, FileFrame)]
         found = {} if self.placing is None else {"poses": "found from the scans"}
         return {
-            "command": command,
-            "derain": derain.__version__,
+            **shared_options(command, source, block),
             **parameters,
             "method": Path(parameters["method"]).name,
             "content of the method": self.fingerprint,
-            "block": block,
             **found,
-            "columns": sorted({",".join(frame.columns) for frame in files}),
-            "intensity_scale": sorted({frame.intensity_scale for frame in source}),
         }

@@ -8,6 +8,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, Self
 
+import derain
 from derain.errors import InputError
 from derain.jobs.job import Job
 from derain.jobs.shard import Shard
@@ -157,6 +158,24 @@ def units_of(source: Sequence[Frame], method: Method | None, block: int = BLOCK)
 def whole(source: Sequence[Frame]) -> FrameUnit:
     """All frames of a source as one unit, of which no record is kept."""
     return FrameUnit(id="", size=0, inputs="", frames=tuple(source))
+
+
+def shared_options(command: str, source: Sequence[Frame], block: int) -> dict[str, Any]:
+    """What the results of any command depend on but the content of the scans, for its job.
+
+    Args:
+        command: Name of the command.
+        source: The scans.
+        block: Scans of a block.
+    """
+    files = [frame for frame in source if isinstance(frame, FileFrame)]
+    return {
+        "command": command,
+        "derain": derain.__version__,
+        "block": block,
+        "columns": sorted({",".join(frame.columns) for frame in files}),
+        "intensity_scale": sorted({frame.intensity_scale for frame in source}),
+    }
 
 
 def folder_of_paths(source: Sequence[Frame], *places: Place) -> Path | None:

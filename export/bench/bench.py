@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from derain import __version__
 from derain.cards.card import DataCard, load_card
 from derain.cards.rain_found import warn_without_rain
 from derain.errors import reason_of
@@ -30,12 +29,11 @@ from derain.filters import PointFilter
 from derain.filters.point_filter import filter_view, rain_among, rows_of
 from derain.jobs.running import Submits, Task, ValueWork, values
 from derain.scan import Scan
-from derain.sources.file_frame import FileFrame
 from derain.sources.folders import GivenScans, source_of
 from derain.sources.reader import FrameReader
 from derain.sources.spread import evenly_spaced
 from derain.sources.training_record import training_overlap
-from derain.sources.units import Division, FrameUnit, folder_of_paths, units_of
+from derain.sources.units import Division, FrameUnit, folder_of_paths, shared_options, units_of
 from derain.spec import Spec
 from derain.stores.url import Place
 from derain.system.extras import MATPLOTLIB, MissingExtraError, require
@@ -358,18 +356,14 @@ class Counting(ValueWork[FrameUnit]):
 
 def _options(methods: Sequence[BenchEntry], data: LabelledFrames, block: int) -> dict[str, Any]:
     """What the counts depend on but the scans."""
-    files = [frame for frame in data.frames if isinstance(frame, FileFrame)]
     return {
-        "command": "bench",
-        "derain": __version__,
+        **shared_options("bench", data.frames, block),
         **{f"method {method.title}": method.fingerprint for method in methods},
         "card": data.card.name,
         "content of the card": _fingerprint(data.card),
-        "columns": sorted({",".join(frame.columns) for frame in files}),
         "intensity_scale": data.intensity_scale,
         "distinct": data.distinct,
         "rain rates": _fingerprint(sorted(data.rain_rates.items())),
-        "block": block,
     }
 
 

@@ -10,10 +10,9 @@ import pytest
 from jobs.counting import Counting
 
 from derain.errors import InputError
-from derain.jobs.job import Job
+from derain.jobs.job import Job, job_status
 from derain.jobs.running import Task, UnfitWorkerError, run
 from derain.jobs.shard import Shard
-from derain.jobs.status import job_status
 from derain.jobs.unit import Unit
 from derain.jobs.workers import TRIES, WorkerPool
 
