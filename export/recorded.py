@@ -159,12 +159,13 @@ class RecordedDerainer(Method):
         scans = ready.scans
         seen = [one.scan for one in (scans.judged, *scans.before, *scans.after)]
         # Of no scan that is not seen any more: each judgement holds its scan.
-        self._alone = {scan: self._alone_of(scan, stopwatch) for scan in seen}
-        alone = self._alone[scans.scan]
-        if alone is None:
-            alone = self.model.judge_silently(scans.scan, stopwatch)  # which raises the reason
+        with ready.naming_errors():
+            self._alone = {scan: self._alone_of(scan, stopwatch) for scan in seen}
+            alone = self._alone[scans.scan]
+            if alone is None:
+                alone = self.model.judge_silently(scans.scan, stopwatch)  # which raises the reason
         self._odd[scans.scan] = [_fails(scan) for scan, judged in self._alone.items() if not judged]
-        with stopwatch.stage("rays"):
+        with ready.naming_errors(), stopwatch.stage("rays"):
             probability = self._with_rays(alone, scans)
         rain = probability > self.model.spec.threshold
         judgement = replace(alone, probability=probability, rain=rain, frame=ready.frame)

@@ -276,7 +276,8 @@ class Derainer(Method):
 
     def _judged_in_window(self, ready: FrameInWindow, stopwatch: Stopwatch) -> Judgement:
         scans = ready.scans
-        judgement = self._judged(scans.scan, lambda: self.view.of_window(scans), stopwatch)
+        with ready.naming_errors():
+            judgement = self._judged(scans.scan, lambda: self.view.of_window(scans), stopwatch)
         return self.with_warnings(replace(judgement, frame=ready.frame))
 
     def _judged(self, scan: Scan, see: Callable[[], ViewedScan], stopwatch: Stopwatch) -> Judgement:

@@ -82,7 +82,8 @@ class Between(RecordingMethod):
     def _judged(self, ready: FrameInWindow) -> Judgement:
         scan = ready.scans.scan
         if scan.intensity is None:
-            raise InputError(ready.frame.name, "it has no intensity", "Give another scan.")
+            with ready.naming_errors():
+                raise InputError(ready.frame.name, "it has no intensity", "Give another scan.")
         self.poses.append(ready.scans.judged.pose)
         rain = scan.valid & (scan.intensity < self.dimmer.rain_below)
         whole = bool(ready.scans.before and ready.scans.after)

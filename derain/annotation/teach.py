@@ -4,7 +4,8 @@ import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,18 +29,18 @@ from derain.errors import InputError
 from derain.evaluation.answers import NOT_KNOWN, TEACHERS_ANSWERS, Answers, TruthRecord
 from derain.files.atomic import replacing, temporary_folder, writing
 from derain.files.labels import LABEL, write_labels
-from derain.files.reading import reading
-from derain.jobs.job import FOLDER, Job
-from derain.jobs.running import Submits, Task, completed, run
+from derain.jobs.job import FOLDER
+from derain.jobs.running import IsThere, Submits, Task, completed, run
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
-from derain.sources.judging import Answer, Guard, unguarded
+from derain.sources.judging import Guard, unguarded
 from derain.sources.method import Method
 from derain.sources.sink import FolderSink, LabelSink
 from derain.sources.source import Source
-from derain.sources.unit_judging import UnitJudging
+from derain.sources.unit_judging import Placing, UnitJudging
 from derain.sources.units import Division, FrameUnit, units_of, whole
+from derain.system.stopwatch import Stopwatch
 from derain.views.scan_issues import ScanIssue, much_removed
 
 # Class ids of a teacher's answers.
@@ -84,6 +85,16 @@ class LabelledScan:
         """Whether anything is known of it."""
         return bool(self.answers.table[:, :NOT_KNOWN].any())
 
+    def to_json(self) -> dict[str, Any]:
+        """The counts as the record of the scan's unit has them."""
+        return {
+            "key": self.frame.key,
+            "number": self.frame.number,
+            "answers": self.answers.table.tolist(),
+            "milliseconds": dict(self.milliseconds),
+            "truth": None if self.truth is None else [cells.tolist() for cells in self.truth],
+        }
+
 
 @dataclass(frozen=True)
 class Labelling(UnitJudging[LabelledScan]):
@@ -100,51 +111,35 @@ class Labelling(UnitJudging[LabelledScan]):
 
     def do(self, unit: FrameUnit) -> Iterator[LabelledScan]:
         """Labels the scans of a unit."""
-        for frame, answer in self.judged(unit.map(Frame.without_labels)):
-            if isinstance(answer, InputError):
-                yield LabelledScan(frame, error=answer)
-                continue
-            try:
-                with reading(Path(frame.name)):  # which names the file where the memory is full
-                    labelled = self._labelled(unit.by_key[frame.key], answer)
-            except InputError as error:
-                labelled = LabelledScan(frame, error=error)
-            yield labelled
+        placed, doubts = self.placed(unit)
+        for labelled in self.results(placed.of(_without_labels), partial(self._labelled, placed)):
+            issues = [*doubts.get(labelled.frame.key, ()), *labelled.issues]
+            yield replace(labelled, issues=issues)
 
-    def is_there(self, unit: FrameUnit) -> bool:
-        """Whether all scans of the unit have labels."""
-        return all(label_path(self.folder, frame.key).exists() for frame in unit.frames)
+    def look(self) -> IsThere[FrameUnit, LabelledScan]:
+        """Whether all scans of a unit have labels."""
+        return lambda unit, labelled: all(
+            label_path(self.folder, frame.key).exists() for frame in unit.frames
+        )
 
-    def failed(self, unit: FrameUnit, error: InputError) -> Iterator[LabelledScan]:
-        """The result of a unit that failed as a whole, which is that of its first scan."""
-        yield LabelledScan(unit.frames[0], error=error)
-
-    def error_of(self, result: LabelledScan) -> InputError | None:
-        """Why a scan has no labels."""
-        return result.error
-
-    def to_json(self, result: LabelledScan) -> dict[str, Any]:
-        """The counts of a scan as a record has them."""
-        return {
-            "key": result.frame.key,
-            "answers": result.answers.table.tolist(),
-            "milliseconds": dict(result.milliseconds),
-            "truth": None if result.truth is None else [cells.tolist() for cells in result.truth],
-        }
+    def failure(self, frame: Frame, error: InputError) -> LabelledScan:
+        """The result of a scan that has no labels."""
+        return LabelledScan(frame, error=error)
 
     def from_json(self, unit: FrameUnit, written: dict[str, Any]) -> LabelledScan:
         """The counts of a scan from its record."""
         truth = written["truth"]
         return LabelledScan(
-            unit.by_key[written["key"]],
+            replace(unit.by_key[written["key"]], number=written["number"]),
             Answers(np.array(written["answers"], np.int64)),
             written["milliseconds"],
             None if truth is None else [np.array(cells, np.int64) for cells in truth],
         )
 
-    def _labelled(self, frame: Frame, answer: Answer) -> LabelledScan:
-        _, judgement, stopwatch = answer
-        labels = labels_of(judgement)
+    def _labelled(
+        self, unit: FrameUnit, unlabelled: Frame, judgement: Judgement, stopwatch: Stopwatch
+    ) -> LabelledScan:
+        frame, labels = unit.by_key[unlabelled.key], labels_of(judgement)
         write_labels(label_path(self.folder, frame.key), labels)
         issues = [*self.method.issues(judgement), *much_removed(judgement.share_of_rain)]
         truth = None
@@ -155,6 +150,10 @@ class Labelling(UnitJudging[LabelledScan]):
                 issues.append(ScanIssue("own labels not measured", f"not measured: {error}"))
         answers = Answers.of(judgement.scan.with_label(labels), TAUGHT_CARD)
         return LabelledScan(frame, answers, dict(stopwatch.milliseconds), truth, issues)
+
+
+def _without_labels(frames: Sequence[Frame]) -> list[Frame]:
+    return [frame.without_labels() for frame in frames]
 
 
 # Receives each labelled scan.
@@ -170,6 +169,7 @@ def teach(
     watch: Watch = lambda scan: None,
     division: Division | None = None,
     executor: Submits | None = None,
+    placing: Placing | None = None,
 ) -> Manifest:
     """Labels recordings: 0 is not rain, 1 rain, 255 not known.
 
@@ -190,6 +190,8 @@ def teach(
             on. None keeps no records.
         executor: Does the units: an executor of :mod:`concurrent.futures` or the like, whose
             processes find all files by the same paths. None does them in this process.
+        placing: Finds where the scans of whole recordings were taken; see
+            :func:`derain.sources.cleaning.clean`.
 
     Returns:
         The manifest. It is not finished, and nothing is in its place, while other shards of the
@@ -206,42 +208,25 @@ def teach(
     if division is not None and division.keeps_records(source, out):
         place = out.absolute()  # other processes may work in another folder
         # The labels of all scans stay there, and are linked to where they belong.
-        work = Labelling(method, fingerprint, place / FOLDER, card)
+        work = Labelling(method, fingerprint, placing, place / FOLDER, card)
         options = work.options("teach", source, division.block)
         options["card"] = None if card is None else card.name
-        task = Task(Job.begin(place, options, division.shard, division.anew), work)
-        units = units_of(source, method, division.block)
-        task.job.list_units(units)
-        frames = _by_units(task, units, division, executor, guard, watch)
-        if frames is None:
-            return Manifest(method.as_dict(), finished=False)
+        block = division.block if placing is None else len(source)  # whole recordings
+        units = units_of(source, method, block)
+        job, shard = division.begin(place, options, units)
+        task = Task(job, work)
+        results = (each.result for each in run(task, shard, executor))
+        frames = _known(results, sum(len(unit.frames) for unit in shard), guard, watch)
+        if division.shard is not None:
+            scans = completed(task, units)
+            if scans is None:
+                return Manifest(method.as_dict(), finished=False)
+            frames = [scan.frame for scan in scans if scan.is_known]
         return _finish(work, out, frames)
     with _unfinished(out) as folder:
-        work = Labelling(method, fingerprint, folder, card)
+        work = Labelling(method, fingerprint, placing, folder, card)
         frames = _known(work.do(whole(source)), len(source), guard, watch)
         return _finish(work, out, frames)
-
-
-def _by_units(
-    task: Task[FrameUnit, LabelledScan],
-    units: list[FrameUnit],
-    division: Division,
-    executor: Submits | None,
-    guard: Guard,
-    watch: Watch,
-) -> list[Frame] | None:
-    """Labels the units that are not done.
-
-    Returns:
-        The frames of which something is known; None while other shards are to be done.
-    """
-    shard = task.job.shard_of(units, division.shard)
-    results = (each.result for each in run(task, shard, executor))
-    frames = _known(results, sum(len(unit.frames) for unit in shard), guard, watch)
-    if division.shard is None:
-        return frames
-    scans = completed(task, units)
-    return None if scans is None else [scan.frame for scan in scans if scan.is_known]
 
 
 def _known(scans: Iterator[LabelledScan], total: int, guard: Guard, watch: Watch) -> list[Frame]:

@@ -9,6 +9,7 @@ Writes a table (bench.md, bench.csv, bench.json) and a plot of error against tim
   derain bench --data scans/ --card wads --methods outdet.onnx --runtime openvino \
       --precision bf16 --out bench
   derain bench --data test/ --train train/ --card wads --methods position intensity --out bench
+  derain bench --data drives/ --methods default dror none --workers 8 --out bench
   derain bench --paper table2 --data REHEARSE3D_PUBLIC --methods outdet.onnx salsanext.onnx \
       lisnownet.onnx dsor.yaml dror.yaml position all none --out table2
   derain bench --paper table3 --data REHEARSE3D_PUBLIC --rain-rates rates.yaml \
@@ -18,9 +19,10 @@ A method is a model (.onnx), parameters from `derain tune` (.yaml), default or a
 a baseline: position and intensity, learnt from the training scans, all and none.
 With --runtime, each model has a second row for that runtime, and derain prints how it differs from
 onnxruntime.
-Scoring runs all methods in one process, where filters share one neighbour search, or in --workers
-processes on blocks of scans, with the same figures. Each method is then timed alone, in its own
-process.
+Scoring runs all methods in one process, where filters share one neighbour search, or unit by unit
+in processes (--workers), shards or a Dask cluster, with the same figures: of more than --block
+scans derain keeps records in --out, what was stopped goes on, and `derain status` prints how far it
+is. Each method is then timed alone, in its own process, by the command that scores the last unit.
 """
 
 import argparse
@@ -33,6 +35,13 @@ from derain.cli.method_options import add_runtime, list_methods, runtime_of
 from derain.cli.options import add_data, add_threads, command_line, count, labelled
 from derain.cli.outputs import print_lines
 from derain.cli.parser import Parser
+from derain.cli.unit_options import (
+    UNIT_OPTIONS,
+    add_units,
+    division_of,
+    executor_of,
+    share_threads,
+)
 from derain.errors import InputError
 from derain.evaluation.published_tables import TABLES, paper_table, scans_by_group
 from derain.files.atomic import replacing, require_writable
@@ -74,13 +83,6 @@ def add_arguments(parser: Parser) -> None:
     )
     parser.add_argument("--paper", choices=TABLES, help="also print this published table")
     add_threads(parser)
-    parser.add_argument(
-        "--workers",
-        type=count,
-        default=1,
-        metavar="N",
-        help="processes that score, which share the threads (default: 1)",
-    )
     add_runtime(parser, help="second runtime for the models")
     parser.add_argument(
         "--timed", type=count, default=10, help="number of timed scans (default: %(default)s)"
@@ -89,12 +91,13 @@ def add_arguments(parser: Parser) -> None:
         "--repeats", type=count, default=3, help="timed runs of each scan (default: %(default)s)"
     )
     parser.add_argument("--seed", type=int, default=0, help="random seed (default: 0)")
+    add_units(parser, workers="1")
 
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     from derain.datamodules.labelled import rain_rates
-    from derain.export.bench.bench import Effort, run_bench
+    from derain.export.bench.bench import Effort, count_in_units, run_bench
     from derain.export.bench.bench_entries import bench_entries
     from derain.export.bench.labelled_frames import LabelledFrames
     from derain.export.bench.report import with_published_rows
@@ -126,16 +129,29 @@ def main(arguments: argparse.Namespace) -> int:
     require_writable(arguments.out / "bench.json")
     effort = Effort(arguments.threads, arguments.timed, arguments.repeats, arguments.seed)
 
-    def bench(frames: Sequence[Frame], out: Path) -> "Bench":
-        """Benches the methods on some of the scans, and writes tables and picture."""
-        chosen = evenly_spaced(frames, arguments.limit or len(frames))
-        frames_of_bench, command = labelled_frames(data, chosen), command_line(arguments)
-        found = run_bench(methods, frames_of_bench, effort, command, arguments.workers)
+    division, workers = division_of(arguments), arguments.workers or 1
+    command = command_line(arguments, without=UNIT_OPTIONS)
+    share_threads(arguments, workers)
+
+    def bench(frames: Sequence[Frame], out: Path) -> "Bench | None":
+        """Benches the methods on some of the scans, and writes tables and picture.
+
+        Returns None while other shards are to be scored.
+        """
+        chosen = labelled_frames(data, evenly_spaced(frames, arguments.limit or len(frames)))
+        with executor_of(arguments, workers) as executor:
+            counted = count_in_units(methods, chosen, arguments.threads, out, division, executor)
+        if counted is None:
+            print_lines(f"How far the other shards are: derain status {out}")
+            return None
+        found = run_bench(methods, chosen, effort, command, counted)
         found.write(out)
         return found
 
     if arguments.paper is None:
-        print_lines(str(bench(_frames(data, arguments.part), arguments.out)))
+        found = bench(_frames(data, arguments.part), arguments.out)
+        if found is not None:
+            print_lines(str(found))
         return 0
     if not data.has_parts:
         raise InputError(
@@ -143,7 +159,10 @@ def main(arguments: argparse.Namespace) -> int:
         )
     table = paper_table(arguments.paper)
     groups = scans_by_group(table, partial(_frames, data), lambda frame: rates.get(frame.sequence))
-    ours = {group: bench(frames, arguments.out / group).rows for group, frames in groups.items()}
+    benches = {group: bench(frames, arguments.out / group) for group, frames in groups.items()}
+    ours = {group: found.rows for group, found in benches.items() if found is not None}
+    if len(ours) < len(benches):
+        return 0
     text = with_published_rows(table, ours, data.card)
     with replacing(arguments.out / f"{arguments.paper}.md") as temporary:
         temporary.write_text(text + "\n", "utf-8")

@@ -6,6 +6,8 @@ folder of sequences as of REHEARSE-3D, SemanticKITTI or WADS, or simulated; one 
 folder of scans) it counts scans and points by class and rain rate. With --grid it fits one grid to
 all scans, for a configuration. `derain info default` prints the card of the model that comes with
 derain: what it is, how good it is, and when not to use it.
+Many scans are counted by processes (--workers), a Dask cluster (--dask) or shards (--shard). With
+--out derain keeps records: what was stopped goes on, and `derain status` prints how far it is.
 
   derain info default
   derain info scan.bin
@@ -18,6 +20,7 @@ derain: what it is, how good it is, and when not to use it.
   derain info drive.mcap/velodyne_points/000012
   derain info REHEARSE3D_PUBLIC --picture statistics.png
   derain info WADS --json
+  derain info drives/ --out counts --workers 8
   derain info my_data --layout lidar,classes --card my_card.yaml
 """
 
@@ -35,14 +38,17 @@ import yaml
 from derain.bags.names import is_bag, within
 from derain.cli.info_file import facts_of_file
 from derain.cli.info_folder import draw, facts_of_folder
-from derain.cli.options import add_columns, add_topic, count
+from derain.cli.options import add_columns, add_topic
 from derain.cli.outputs import print_lines
+from derain.cli.unit_options import add_executor, add_shard, executor_of, shard_of
 from derain.default import DEFAULT, ModelCard, ModelScore, default_model, model_card
 from derain.errors import InputError, printable
 from derain.evaluation.text_tables import number_text, plain_table
 from derain.files.documents import Entry
 from derain.files.format import FORMATS
 from derain.sources.folders import named_frames
+from derain.sources.units import Division
+from derain.stores.url import place_of
 from derain.system.extras import MATPLOTLIB, require
 from derain.system.notices import warn
 from derain.views.candidates import candidates_at
@@ -72,13 +78,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="names of a sequence's folders of scans and labels (default: known names)",
     )
     parser.add_argument("--picture", type=Path, help="draw a folder's statistics to this PNG file")
-    parser.add_argument(
-        "--workers",
-        type=count,
-        default=1,
-        metavar="N",
-        help="processes that count a folder's points (default: 1)",
+    group = parser.add_argument_group("a folder of many scans")
+    add_executor(group, "processes that count a folder's points (default: 1)")
+    add_shard(group)
+    group.add_argument(
+        "--out",
+        type=place_of,
+        help="folder or URL for records of what is counted: the same command goes on where it was "
+        "stopped, and shards add up",
     )
+    group.add_argument("--anew", action="store_true", help="count everything again")
     parser.add_argument(
         "--formats", action=_ListFormats, nargs=0, help="list the formats of scans, and exit"
     )
@@ -102,10 +111,16 @@ class _ListFormats(argparse.Action):
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
+    one_folder = len(arguments.files) == 1 and os.path.isdir(arguments.files[0])
     if arguments.picture:
-        if arguments.grid or len(arguments.files) > 1 or not os.path.isdir(arguments.files[0]):
+        if arguments.grid or not one_folder:
             raise InputError("--picture", "shows one folder's statistics", "Name one folder alone.")
         require("--picture", MATPLOTLIB)
+    if arguments.out is not None and (arguments.grid or not one_folder):
+        raise InputError("--out", "keeps records of one folder", "Name one folder alone.")
+    if arguments.out is None and (arguments.shard is not None or arguments.anew):
+        option = "--anew" if arguments.anew else "--shard"
+        raise InputError(option, "needs a folder of records", "Name one by --out.")
     if arguments.grid:
         paths = within([Path(name) for name in arguments.files], arguments.topic)
         frames = named_frames(paths, arguments.columns)
@@ -154,9 +169,22 @@ def _describe_default(as_json: bool) -> None:
 
 
 def _describe_folder(folder: Path, arguments: argparse.Namespace) -> None:
-    facts = facts_of_folder(
-        folder, arguments.card, arguments.layout, arguments.columns, arguments.workers
-    )
+    division = Division()
+    if arguments.out is not None:
+        division = Division(shard=shard_of(arguments), anew=arguments.anew)
+    with executor_of(arguments, arguments.workers or 1) as executor:
+        facts = facts_of_folder(
+            folder,
+            arguments.card,
+            arguments.layout,
+            arguments.columns,
+            arguments.out,
+            division,
+            executor,
+        )
+    if facts is None:
+        print_lines(f"How far the other shards are: derain status {arguments.out}")
+        return
     print_lines(json.dumps(facts.as_dict()) if arguments.json else facts.as_text())
     if arguments.card is not None and not facts.total.labelled:
         warn(

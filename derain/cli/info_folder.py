@@ -5,19 +5,24 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from tqdm import tqdm
-
 from derain.cards.card import DataCard, load_card
 from derain.cards.known import card_by_folders, layouts_for
 from derain.cards.layout import Layout
 from derain.errors import InputError
-from derain.evaluation.contents import Contents, class_name, count_frames, find_sequences, rate_name
+from derain.evaluation.contents import (
+    Contents,
+    FrameCounting,
+    class_name,
+    find_sequences,
+    rate_name,
+)
 from derain.evaluation.text_tables import plain_table
-from derain.jobs.workers import each_by
+from derain.jobs.running import Submits, Task, values
 from derain.simulation.manifest import manifest_of
 from derain.sources.folders import find_layout
 from derain.sources.frame import Frame
-from derain.sources.units import BLOCK
+from derain.sources.units import Division, FrameUnit, folder_of_paths, shared_options, units_of
+from derain.stores.url import Place
 
 # What a data card is chosen by. Names of folders that many data sets have make it a guess.
 CardRestsOn = Literal["--card", "manifest", "names of folders"]
@@ -113,8 +118,10 @@ def facts_of_folder(
     card_name: str | None,
     layout_names: str | None,
     columns: Sequence[str],
-    workers: int = 1,
-) -> FolderFacts:
+    records: Place | None = None,
+    division: Division = Division(),
+    executor: Submits | None = None,
+) -> FolderFacts | None:
     """Counts what is in a folder.
 
     Args:
@@ -123,10 +130,16 @@ def facts_of_folder(
         layout_names: Names of its folders of scans and labels, with a comma between; None finds
             them.
         columns: Names of the columns of files that do not name them.
-        workers: Processes that count.
+        records: Where records of what is counted are kept; None keeps none.
+        division: How the scans are divided into units.
+        executor: Counts the units; None counts them in this process.
+
+    Returns:
+        The counts; None while other shards are to be counted.
 
     Raises:
-        InputError: A folder without scans, a file in it that cannot be read, or no such data card.
+        InputError: A folder without scans, a file in it that cannot be read, or no such data card;
+            records of another folder.
     """
     card = None if card_name is None else load_card(card_name)
     layout = _layout(folder, card, layout_names)
@@ -136,18 +149,32 @@ def facts_of_folder(
         {sequence.rain_rate for sequence in sequences}, key=lambda rate: (rate is None, rate or 0)
     )
     by_rain_rate = {rate: Contents() for rate in rates}
-    blocks: list[tuple[float | None, list[Frame]]] = []
+    # In this process units are of one scan, so that a progress bar counts scans.
+    block = 1 if records is None and executor is None else division.block
+    frames: list[Frame] = []
+    units: list[FrameUnit] = []
+    rate_of_unit: list[float | None] = []
     for sequence in sequences:
         by_rain_rate[sequence.rain_rate].sequences += 1
-        frames = list(sequence.frames)
-        starts = range(0, len(frames), BLOCK)
-        blocks += [(sequence.rain_rate, frames[start : start + BLOCK]) for start in starts]
-    scans = sum(len(frames) for _, frames in blocks)
-    counted = each_by(workers, count_frames, [frames for _, frames in blocks])
-    with tqdm(total=scans, unit="scan", disable=None) as progress:
-        for (rate, frames), contents in zip(blocks, counted, strict=True):
-            by_rain_rate[rate].add(contents)
-            progress.update(len(frames))
+        of_sequence = units_of(sequence.frames, None, block)
+        frames += sequence.frames
+        units += of_sequence
+        rate_of_unit += [sequence.rain_rate] * len(of_sequence)
+    job, shard = None, units
+    if records is not None:
+        options = {
+            **shared_options("info", frames, block),
+            "folder": str(folder),
+            "layout": None if layout is None else [layout.scans, layout.labels],
+        }
+        job, shard = division.begin(records, options, units)
+    places = () if records is None else (records,)
+    task = Task(job, FrameCounting(), folder_of_paths(frames, *places))
+    counted = values(task, units, shard, executor, "counting")
+    if counted is None:
+        return None
+    for rate, counts in zip(rate_of_unit, counted, strict=True):
+        by_rain_rate[rate].add(Contents.from_json(counts))
     return FolderFacts(folder, layout, card, rests_on, by_rain_rate)
 
 

@@ -200,16 +200,23 @@ def labelled(
     return labelled_scans(paths, card_of(paths, card), loading)
 
 
-def command_line(arguments: argparse.Namespace, positional: str | None = None) -> str:
+def command_line(
+    arguments: argparse.Namespace, positional: str | None = None, without: Sequence[str] = ()
+) -> str:
     """The command line of some parsed arguments, defaults included.
 
     Args:
         arguments: The parsed arguments, with the name of the command.
         positional: Name of the positional argument, if there is one.
+        without: Names of arguments that change no result.
     """
     words = ["derain", arguments.command]
     for name, value in vars(arguments).items():
-        if name == "command" or value is None or (value is False and name not in DENIABLE):
+        if (
+            name in ("command", *without)
+            or value is None
+            or (value is False and name not in DENIABLE)
+        ):
             continue
         if name != positional:
             words.append(f"--{'no-' if value is False else ''}{name.replace('_', '-')}")

@@ -63,7 +63,14 @@ from derain.cli.options import (
 )
 from derain.cli.outputs import exit_code, noting_progress, print_error, print_facts, print_lines
 from derain.cli.parser import Parser
-from derain.cli.unit_options import add_units, division_of, executor_of, workers_of
+from derain.cli.unit_options import (
+    add_units,
+    division_of,
+    executor_of,
+    method_and_workers,
+    odometry_of,
+    with_given_poses,
+)
 from derain.cli.weather_options import (
     add_weather,
     warn_of_bad_weather,
@@ -76,7 +83,6 @@ from derain.example import Truth
 from derain.export.methods import CUES, DELAY, PAST
 from derain.export.runtime import Derainer
 from derain.files.labels import LABEL
-from derain.recordings.posed import STANDING
 from derain.sources.clean_sink import CleanSink, require_probabilities
 from derain.sources.cleaned_bags import RAIN_PROBABILITY, BagOptions
 from derain.sources.cleaned_scan import ScanOutcome
@@ -85,14 +91,11 @@ from derain.sources.method import Method
 from derain.sources.recordings import irregularities
 from derain.sources.store_listing import frames_at
 from derain.sources.stored_frame import StoredBag
-from derain.sources.units import spans_of
 from derain.stores.url import Place, is_url, place_of
-from derain.system.cores import threads_of
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
 from derain.views.scan_issues import MOST_RAIN, ScanIssue
 from derain.weather.record import weather_row
-from derain.workflows.odometry import placed
 
 # Options that only --help-all shows.
 RARE = (
@@ -158,24 +161,19 @@ def main(arguments: argparse.Namespace) -> int:
     division = division_of(arguments)
     alone = method_of(name, arguments)
     frames = frames_at(scans, arguments.columns, arguments.topic)
-    # Of the bags of a store, the clouds are not known before they are fetched.
-    stored = [frame for frame in frames if isinstance(frame, StoredBag)]
-    if stored and arguments.poses not in (None, STANDING):
-        reason = f"{stored[0].name} is in a store, and its clouds are not known before the run"
-        raise InputError("--poses", reason, "Copy the bag to this machine.")
-    source = placed(frames, arguments.poses, arguments.threads).map(
+    source = with_given_poses(frames, arguments).map(
         lambda frame: frame.with_intensity_times(arguments.intensity_scale)
     )
     if arguments.probability:
         require_probabilities(alone, source)
-    several = len(source) > 1 or bool(stored)
-    method = _over_recording(alone, arguments, several)
-    workers = workers_of(arguments, lambda: len(spans_of(source, method, arguments.block)))
-    if workers > 1 or arguments.dask is not None:
-        # A worker of Dask does a unit in each of its threads.
-        shared = 1 if arguments.dask and not arguments.threads else threads_of(arguments.threads)
-        arguments.threads = max(shared // workers, 1)
-        method = _over_recording(method_of(name, arguments), arguments, several)
+    # How many clouds a bag in a store has is known when it is fetched.
+    several = len(source) > 1 or isinstance(source[0], StoredBag)
+    method, workers = method_and_workers(
+        _over_recording(alone, arguments, several),
+        lambda: _over_recording(method_of(name, arguments), arguments, several),
+        source,
+        arguments,
+    )
     weather = weather_options(arguments)
     sink = CleanSink(
         arguments.out,
@@ -201,6 +199,7 @@ def main(arguments: argparse.Namespace) -> int:
             source,
             method,
             sink,
+            placing=odometry_of(arguments),
             most_removed=arguments.most_removed,
             weather=weather,
             observer=printer,

@@ -1,14 +1,14 @@
-"""Prints how far a run, simulate or teach is: done, failed and missing units, and totals of a run.
+"""Prints how far a command over many scans is: done, failed and missing units, totals of a run.
 
   derain status cleaned
   derain status worlds --json
   derain status s3://bucket/cleaned
 
 A unit is a recording, a bag, or a block of scans of a long recording; of simulate it is a sequence.
-Runs of more than 50 scans keep a record of each unit in the folder of --out, and so do runs by
-several processes or machines; simulate and teach always do. A failed unit is done again by the same
-command, and so is a missing one. For shards of a SLURM array, the last line has the tasks that are
-to be run again.
+run, teach and bench keep a record of each unit in the folder of --out where there are more than 50
+scans, several processes or machines; simulate always does, and info where --out names a folder. A
+failed unit is done again by the same command, and so is a missing one. For shards of a SLURM array,
+the last line has the tasks that are to be run again.
 The exit code is 2 unless all units are done.
 """
 
@@ -17,10 +17,9 @@ import json
 
 from derain.cli.outputs import print_lines
 from derain.cli.parser import Parser
-from derain.jobs.job import Job
-from derain.jobs.record import Record
-from derain.jobs.status import JobStatus, job_status
-from derain.sources.cleaned_totals import CleanedTotals
+from derain.jobs.job import Job, JobStatus, job_status
+from derain.jobs.unit import Record
+from derain.sources.cleaned_scan import CleanedTotals
 from derain.stores.url import place_of
 
 # At most so many failed units are printed with their reasons.

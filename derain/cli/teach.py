@@ -36,17 +36,21 @@ from derain.cli.method_options import add_method_and_scans, method_and_scans, me
 from derain.cli.options import add_columns, add_intensity_scale, add_json, add_poses, add_topic
 from derain.cli.outputs import exit_code, print_error, print_facts, print_lines
 from derain.cli.parser import Parser
-from derain.cli.unit_options import add_units, division_of, executor_of, workers_of
+from derain.cli.unit_options import (
+    add_units,
+    division_of,
+    executor_of,
+    method_and_workers,
+    odometry_of,
+    with_given_poses,
+)
 from derain.evaluation.counts import or_none
 from derain.evaluation.text_tables import number_text
 from derain.export.methods import over_recording
 from derain.sources.folders import named_frames
 from derain.sources.judging import Failures
-from derain.sources.units import spans_of
 from derain.stores.url import paths_of
-from derain.system.cores import threads_of
 from derain.system.memory import keep_freed_memory
-from derain.workflows.odometry import placed
 
 if TYPE_CHECKING:
     from derain.annotation.teach import LabelledScan
@@ -86,14 +90,13 @@ def main(arguments: argparse.Namespace) -> int:
         layouts=layouts_for(card),
         recordings=True,
     )
-    refuse_to_overwrite(arguments.out, found)  # before odometry, which takes minutes
-    source = placed(found, arguments.poses, arguments.threads).map(
+    refuse_to_overwrite(arguments.out, found)
+    source = with_given_poses(found, arguments).map(
         lambda frame: frame.with_intensity_times(arguments.intensity_scale)
     )
-    workers = workers_of(arguments, lambda: len(spans_of(source, method, arguments.block)))
-    if workers > 1:
-        arguments.threads = max(threads_of(arguments.threads) // workers, 1)
-        method = over_recording(method_of(name, arguments))
+    method, workers = method_and_workers(
+        method, lambda: over_recording(method_of(name, arguments)), source, arguments
+    )
     failures = Failures(print_error)
     with executor_of(arguments, workers) as executor:
         results = teach_recordings(
@@ -105,6 +108,7 @@ def main(arguments: argparse.Namespace) -> int:
             watch=lambda scan: _print_labels(scan, arguments.json),
             division=division,
             executor=executor,
+            placing=odometry_of(arguments),
         )
     stream = sys.stderr if arguments.json else sys.stdout
     print_lines(f"{results.judged:,} scans\n{results.answers}", stream)

@@ -9,10 +9,16 @@ from derain.errors import InputError
 from derain.jobs.running import Submits
 from derain.jobs.shard import TASK, Shard
 from derain.jobs.workers import processes
-from derain.sources.units import BLOCK, Division
+from derain.recordings.posed import ODOMETRY, Odometry, with_poses
+from derain.sources.method import Method
+from derain.sources.source import Source
+from derain.sources.units import BLOCK, Division, spans_of
 from derain.system.cores import threads_of
 from derain.system.memory import total_memory
 from derain.system.notices import warn
+
+# The options that :func:`add_units` declares: how the work is divided changes no result.
+UNIT_OPTIONS = ("workers", "dask", "shard", "resume", "anew", "block")
 
 # A worker has at least so many units where there are several workers unasked: none waits for long.
 UNITS_OF_WORKER = 4
@@ -21,12 +27,17 @@ UNITS_OF_WORKER = 4
 MEMORY_OF_WORKER = 2 * 10**9
 
 
-def add_units(parser: argparse.ArgumentParser) -> None:
-    """Declares the options of commands that judge many scans."""
+def add_units(
+    parser: argparse.ArgumentParser, workers: str = "one per thread for many scans, else 1"
+) -> None:
+    """Declares the options of commands that judge many scans.
+
+    Args:
+        parser: The command's parser.
+        workers: How many processes there are by default.
+    """
     group = parser.add_argument_group("many scans")
-    add_executor(
-        group, "processes, which share the threads (default: one per thread for many scans, else 1)"
-    )
+    add_executor(group, f"processes, which share the threads (default: {workers})")
     add_shard(group)
     group.add_argument(
         "--resume",
@@ -122,6 +133,54 @@ def workers_of(arguments: argparse.Namespace, count_units: Callable[[], int]) ->
     cores = threads_of(arguments.threads)
     fitting = min(cores, total_memory() // MEMORY_OF_WORKER)
     return fitting if fitting > 1 and count_units() >= UNITS_OF_WORKER * fitting else 1
+
+
+def share_threads(arguments: argparse.Namespace, workers: int) -> bool:
+    """Divides the threads of the arguments between workers; returns whether there are several.
+
+    A worker of Dask does a unit in each of its threads: it has one thread, unless others are named.
+
+    Args:
+        arguments: The options, whose threads are changed.
+        workers: Number of processes of this machine.
+    """
+    if workers == 1 and arguments.dask is None:
+        return False
+    shared = 1 if arguments.dask and not arguments.threads else threads_of(arguments.threads)
+    arguments.threads = max(shared // workers, 1)
+    return True
+
+
+def with_given_poses(source: Source, arguments: argparse.Namespace) -> Source:
+    """The scans with the poses that the arguments name, but for those of odometry.
+
+    Raises:
+        InputError: Poses that cannot be read or do not fit the scans.
+    """
+    if arguments.poses in (None, ODOMETRY):
+        return source
+    return with_poses(source, arguments.poses)
+
+
+def odometry_of(arguments: argparse.Namespace) -> Odometry | None:
+    """What finds the poses in the process that does a unit; None where they are not to be found."""
+    return Odometry(arguments.threads) if arguments.poses == ODOMETRY else None
+
+
+def method_and_workers(
+    method: Method, remake: Callable[[], Method], source: Source, arguments: argparse.Namespace
+) -> tuple[Method, int]:
+    """The method with the threads of a worker, and the number of workers.
+
+    Args:
+        method: The method with the threads of the arguments.
+        remake: Makes it again, of changed arguments.
+        source: The scans.
+        arguments: The options.
+    """
+    block = len(source) if arguments.poses == ODOMETRY else arguments.block
+    workers = workers_of(arguments, lambda: len(spans_of(source, method, block)))
+    return (remake() if share_threads(arguments, workers) else method), workers
 
 
 @contextmanager

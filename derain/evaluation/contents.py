@@ -3,11 +3,11 @@
 import csv
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -15,11 +15,14 @@ from derain.cards.layout import Layout, folder_above
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS
 from derain.files.labels import label_beside
+from derain.files.names import scan_stem
 from derain.files.reading import reading
+from derain.jobs.running import ValueWork
 from derain.simulation.manifest import RAIN_RATE, manifest_of
 from derain.sources.folders import frames_of, listed_scans, scan_folders
 from derain.sources.frame import Frame
 from derain.sources.source import Source
+from derain.sources.units import FrameUnit
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,12 @@ class Contents:
         self.scans += other.scans
         self.points += other.points
         self.labelled.update(other.labelled)
+
+    @classmethod
+    def from_json(cls, counted: Mapping[str, Any]) -> Self:
+        """What :meth:`FrameCounting.value` counted."""
+        labelled = Counter({int(id_): points for id_, points in counted["labelled"].items()})
+        return cls(0, counted["scans"], counted["points"], labelled)
 
     def as_dict(self, classes: Mapping[int, str]) -> dict[str, Any]:
         """Numbers, and points and their share by the name of the class, as JSON-able primitives.
@@ -116,22 +125,28 @@ def find_sequences(
     sequences = []
     for folder in folders:
         name = folder.absolute().parent.name
-        frames = frames_of(listed_scans([folder]), layout.label_of, columns)
+        scans = listed_scans([folder])
+        keys = [f"{name}/{scan_stem(scan)}" for scan in scans]
+        frames = frames_of(scans, layout.label_of, columns, keys)
         rate = rates[name] if name in rates else _recorded_rate(folder_above(folder) / "weather")
         sequences.append(SequenceOfFrames(name, frames, rate))
     return sequences
 
 
-def count_frames(frames: Iterable[Frame]) -> Contents:
-    """Counts the scans and points of some frames.
+class FrameCounting(ValueWork[FrameUnit]):
+    """Counts the scans and points of units."""
 
-    Raises:
-        InputError: As for :func:`count_frame`.
-    """
-    contents = Contents()
-    for frame in frames:
-        contents.add(count_frame(frame))
-    return contents
+    def value(self, unit: FrameUnit) -> dict[str, Any]:
+        """The counts of a unit, as :meth:`Contents.from_json` takes them.
+
+        Raises:
+            InputError: As for :func:`count_frame`.
+        """
+        total = Contents()
+        for frame in unit.frames:
+            total.add(count_frame(frame))
+        labelled = {str(id_): points for id_, points in total.labelled.items()}
+        return {"scans": total.scans, "points": total.points, "labelled": labelled}
 
 
 def count_frame(frame: Frame) -> Contents:

@@ -2,8 +2,9 @@
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from itertools import repeat
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,15 +119,25 @@ class Scoring:
                 rows = known & points
                 self.by_sensor[sensor] += Counts.of(predicted[rows], rain[rows])
 
-    def add(self, later: "Scoring") -> None:
+    def to_json(self) -> dict[str, Any]:
+        """The counts so far, as :meth:`add` takes them."""
+        return {
+            "cells": self.counts.cells.tolist(),
+            "per_scan": [astuple(counts) for counts in self.counts.per_scan],
+            "by_rain_rate": [[rate, *astuple(each)] for rate, each in self.by_rain_rate.items()],
+            "by_sensor": [[sensor, *astuple(each)] for sensor, each in self.by_sensor.items()],
+            "failures": self.failures,
+        }
+
+    def add(self, later: Mapping[str, Any]) -> None:
         """Adds the counts of later scans, which may come from another process."""
-        self.counts.cells += later.counts.cells
-        self.counts.per_scan += later.counts.per_scan
-        for rate, counts in later.by_rain_rate.items():
-            self.by_rain_rate[rate] += counts
-        for sensor, counts in later.by_sensor.items():
-            self.by_sensor[sensor] += counts
-        self.failures |= later.failures
+        self.counts.cells += np.array(later["cells"], np.int64)
+        self.counts.per_scan += [Counts(*counts) for counts in later["per_scan"]]
+        for rate, *counts in later["by_rain_rate"]:
+            self.by_rain_rate[rate] += Counts(*counts)
+        for sensor, *counts in later["by_sensor"]:
+            self.by_sensor[sensor] += Counts(*counts)
+        self.failures |= later["failures"]
 
     def scores(self) -> Scores:
         """The counts so far."""

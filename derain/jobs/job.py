@@ -1,11 +1,12 @@
-"""A job in a folder: its options, its units, and a record of each unit that is done.
+"""A job in a folder: its options, its units, a record of each unit that is done, and how far it is.
 
 They lie beside the results, in the hidden folder ``.derain``: ``job.json``, ``units.json``, and a
 record ``units/<id>.json`` for each unit that is done or failed. Each file is written whole.
 """
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -13,9 +14,8 @@ from hashlib import sha256
 from typing import Any, Self, TypeVar
 
 from derain.errors import InputError
-from derain.jobs.record import Record
-from derain.jobs.shard import Shard
-from derain.jobs.unit import Unit
+from derain.jobs.shard import Shard, array_expression, shard_numbers
+from derain.jobs.unit import Record, Unit
 from derain.stores.documents import Documents, documents_at
 from derain.stores.url import Place, without_secrets
 
@@ -43,13 +43,19 @@ class Job:
 
     @classmethod
     def begin(
-        cls, folder: Place, options: Mapping[str, Any], shard: Shard | None, anew: bool = False
+        cls,
+        folder: Place,
+        options: Mapping[str, Any],
+        units: Sequence[Unit],
+        shard: Shard | None = None,
+        anew: bool = False,
     ) -> Self:
         """Begins a job, or goes on with the one of the folder.
 
         Args:
             folder: The folder of the results, made if missing.
             options: The options.
+            units: All of its units, which are listed for :meth:`listed`.
             shard: The shard that is done now; None for all of it.
             anew: Whether the records of another job are removed; its results stay until they are
                 written anew.
@@ -69,6 +75,8 @@ class Job:
         ours._documents.create(JOB, json.dumps(written, indent=1))
         begun = cls.at(folder)  # another command may have been quicker
         ours._refuse_other(begun)
+        listed = [[unit.id, unit.size, unit.inputs] for unit in units]
+        begun._documents.write(UNITS, json.dumps(listed))
         return begun
 
     @classmethod
@@ -103,15 +111,6 @@ class Job:
     def fingerprint(self) -> str:
         """Of its options, 16 hexadecimal digits."""
         return sha256(json.dumps(self.options, sort_keys=True).encode()).hexdigest()[:16]
-
-    def list_units(self, units: Sequence[Unit]) -> None:
-        """Writes which units there are, for :meth:`listed`.
-
-        Raises:
-            InputError: They cannot be written.
-        """
-        listed = [[unit.id, unit.size, unit.inputs] for unit in units]
-        self._documents.write(UNITS, json.dumps(listed))
 
     def shard_of(self, units: list[UnitT], shard: Shard | None) -> list[UnitT]:
         """The units of a shard, in their order.
@@ -181,6 +180,64 @@ class Job:
                 f"was begun by other options: {changed}",
                 "Give --out another folder, or --anew to have all of it done again.",
             )
+
+
+@dataclass(frozen=True)
+class JobStatus:
+    """How far a job is.
+
+    Attributes:
+        job: The job.
+        units: All of its units, in order.
+        done: Number of units that are done.
+        failed: Records of the units that failed.
+        missing: The units without a record.
+        seconds: Time that the units took, by worker.
+    """
+
+    job: Job
+    units: list[Unit]
+    done: int
+    failed: list[Record]
+    missing: list[Unit]
+    seconds: dict[str, float]
+
+    @property
+    def array(self) -> str | None:
+        """The tasks of ``sbatch --array`` with units to do; None without any, or without shards."""
+        to_do = [*(record.unit for record in self.failed), *(unit.id for unit in self.missing)]
+        if self.job.shards is None or not to_do:
+            return None
+        count, first = self.job.shards
+        number_of = shard_numbers(self.units, count)
+        return array_expression([number_of[unit] + first for unit in to_do])
+
+
+def job_status(folder: Place, on_done: Callable[[Record], None]) -> JobStatus:
+    """Reads the records of a job.
+
+    Args:
+        folder: The folder of its results, a path or a URL.
+        on_done: Receives the record of each unit that is done, in the order of the units.
+
+    Raises:
+        InputError: There is no job in the folder.
+    """
+    job = Job.at(folder)
+    units = job.listed()
+    failed, missing = [], []
+    seconds: dict[str, float] = defaultdict(float)
+    for unit, record in job.records_of(units):
+        if record is None:
+            missing.append(unit)
+            continue
+        seconds[record.worker] += record.seconds
+        if record.errors:
+            failed.append(record)
+        else:
+            on_done(record)
+    done = len(units) - len(failed) - len(missing)
+    return JobStatus(job, units, done, failed, missing, seconds)
 
 
 def differences(begun: Mapping[str, Any], now: Mapping[str, Any]) -> str:

@@ -1,5 +1,6 @@
 """Does the units of a job, here or by an executor, and passes over those that are done."""
 
+import os
 import pickle
 import platform
 import threading
@@ -9,20 +10,20 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar, cast
+
+from tqdm import tqdm
 
 import derain
 from derain.errors import InputError
 from derain.jobs.job import Job
-from derain.jobs.record import Record
-from derain.jobs.unit import Unit
+from derain.jobs.unit import Record, Unit
+from derain.system.notices import warn
 
 # At most so many units wait for an earlier one to be reported: their results are kept meanwhile.
 AHEAD = 1000
-
-UnitT = TypeVar("UnitT", bound=Unit)
-ResultT = TypeVar("ResultT")
 
 
 class UnfitWorkerError(InputError):
@@ -39,6 +40,24 @@ class Submits(Protocol):
         """Has work done, now or later, here or elsewhere."""
 
 
+class Result(Protocol):
+    """What came of a unit, or of a part of it."""
+
+    @property
+    def error(self) -> InputError | None:
+        """Why nothing came of it; None where something did."""
+
+    def to_json(self) -> Any:
+        """The result as its record has it."""
+
+
+UnitT = TypeVar("UnitT", bound=Unit)
+ResultT = TypeVar("ResultT", bound=Result)
+
+# Whether everything is there that a unit wrote, by its results.
+IsThere = Callable[[UnitT, list[ResultT]], bool]
+
+
 class Work(ABC, Generic[UnitT, ResultT]):
     """What is done of each unit. It is pickled once a job, and each thread keeps its last one."""
 
@@ -51,24 +70,16 @@ class Work(ABC, Generic[UnitT, ResultT]):
         """
 
     @abstractmethod
-    def is_there(self, unit: UnitT) -> bool:
-        """Whether everything that the unit writes is there."""
-
-    @abstractmethod
-    def failed(self, unit: UnitT, error: InputError) -> Iterator[ResultT]:
-        """The results of a unit that failed as a whole."""
-
-    @abstractmethod
-    def error_of(self, result: ResultT) -> InputError | None:
-        """The error of a result that failed; None of another."""
-
-    @abstractmethod
-    def to_json(self, result: ResultT) -> Any:
-        """A result as its record has it."""
+    def failed(self, unit: UnitT, error: InputError) -> ResultT:
+        """The result of a unit that failed as a whole."""
 
     @abstractmethod
     def from_json(self, unit: UnitT, written: Any) -> ResultT:
         """A result from its record."""
+
+    def look(self) -> IsThere[UnitT, ResultT]:
+        """Looks at what is written by now; of work that writes nothing, all is there."""
+        return lambda unit, results: True
 
     def check(self) -> None:
         """Refuses a process where the results would be others than where the job began.
@@ -79,17 +90,58 @@ class Work(ABC, Generic[UnitT, ResultT]):
 
 
 @dataclass(frozen=True)
+class Value:
+    """The only result of a unit.
+
+    Attributes:
+        content: The result, of primitives of JSON.
+        error: Why there is none.
+    """
+
+    content: Any = None
+    error: InputError | None = None
+
+    def to_json(self) -> Any:
+        """The result, as it is."""
+        return self.content
+
+
+class ValueWork(Work[UnitT, Value]):
+    """Work with one result a unit."""
+
+    @abstractmethod
+    def value(self, unit: UnitT) -> Any:
+        """Does a unit, and returns its result, of primitives of JSON.
+
+        Raises:
+            InputError: It cannot be done.
+        """
+
+    def do(self, unit: UnitT) -> Iterator[Value]:
+        """Does a unit."""
+        yield Value(self.value(unit))
+
+    def failed(self, unit: UnitT, error: InputError) -> Value:
+        """The result of a unit that failed."""
+        return Value(error=error)
+
+    def from_json(self, unit: UnitT, written: Any) -> Value:
+        """A result from its record."""
+        return Value(written)
+
+
+@dataclass(frozen=True)
 class Task(Generic[UnitT, ResultT]):
     """What a process does of the units of a job, with a record of each.
 
     Attributes:
-        job: The job.
+        job: The job; None keeps no records.
         work: What is done.
         folder: The folder that relative paths begin in; None where there are none.
         version: The version of derain that began it.
     """
 
-    job: Job
+    job: Job | None
     work: Work[UnitT, ResultT]
     folder: Path | None = None
     version: str = derain.__version__
@@ -112,11 +164,15 @@ class Task(Generic[UnitT, ResultT]):
 
     def done(self, units: Sequence[UnitT]) -> Iterator[tuple[UnitT, list[ResultT] | None]]:
         """The results of each unit by its record; None where it is to be done."""
+        if self.job is None:
+            yield from ((unit, None) for unit in units)
+            return
+        is_there = self.work.look()
         for unit, record in self.job.records_of(units):
-            if record is None or record.errors or not self.work.is_there(unit):
-                yield unit, None
-            else:
-                yield unit, [self.work.from_json(unit, written) for written in record.results]
+            results = None
+            if record is not None and not record.errors:
+                results = [self.work.from_json(unit, written) for written in record.results]
+            yield unit, results if results is not None and is_there(unit, results) else None
 
     def do(self, unit: UnitT) -> Iterator[ResultT]:
         """Does a unit and yields its results; its record is there at the end."""
@@ -132,21 +188,31 @@ class Task(Generic[UnitT, ResultT]):
                 results.append(result)
                 yield result
         except InputError as error:
-            failed = list(self.work.failed(unit, error))
-            results += failed
-            yield from failed
+            results.append(self.work.failed(unit, error))
+            yield results[-1]
         self._record(unit, results, seconds)
 
     def fail(self, unit: UnitT, error: InputError) -> list[ResultT]:
         """The results of a unit that failed where its process could not record it."""
-        results = list(self.work.failed(unit, error))
+        results = [self.work.failed(unit, error)]
         self._record(unit, results, 0.0)
         return results
 
     def _record(self, unit: UnitT, results: list[ResultT], seconds: float) -> None:
-        errors = [error for each in results if (error := self.work.error_of(each)) is not None]
-        written = [self.work.to_json(each) for each in results if not self.work.error_of(each)]
-        self.job.record(Record.of(unit, self.job.fingerprint, seconds, errors, written))
+        if self.job is None:
+            return
+        errors = [each.error for each in results if each.error is not None]
+        record = Record(
+            unit=unit.id,
+            inputs=unit.inputs,
+            options=self.job.fingerprint,
+            worker=f"{platform.node()}-{os.getpid()}",
+            ended=datetime.now(UTC).isoformat(timespec="seconds"),
+            seconds=round(seconds, 3),
+            errors=[[str(error.subject), error.reason, error.remedy] for error in errors],
+            results=[each.to_json() for each in results if each.error is None],
+        )
+        self.job.record(record)
 
 
 @dataclass(frozen=True)
@@ -205,6 +271,55 @@ def completed(task: Task[UnitT, ResultT], units: Sequence[UnitT]) -> list[Result
     return results
 
 
+def values(
+    task: Task[UnitT, Value],
+    units: Sequence[UnitT],
+    shard: Sequence[UnitT],
+    executor: Submits | None,
+    doing: str,
+    unit: str = "unit",
+) -> list[Any] | None:
+    """Does the units of a shard, and returns the results of all units.
+
+    Where records are kept, a unit that fails does not stop the others.
+
+    Args:
+        task: What is done of each.
+        units: All units of the job.
+        shard: Those that are done now.
+        executor: What does them; None does one after the other in this process.
+        doing: What a progress bar calls it, such as "counting".
+        unit: What a unit is.
+
+    Returns:
+        The results, in the order of the units; None while other shards are to be done.
+
+    Raises:
+        InputError: A unit failed; or as for :func:`run`.
+    """
+    found: list[Any] = []
+    failures: list[InputError] = []
+    results = run(task, shard, executor)
+    for each in tqdm(results, total=len(shard), desc=doing, unit=unit, disable=None):
+        if (error := each.result.error) is None:
+            found.append(each.result.content)
+        elif task.job is None:
+            raise error
+        else:
+            warn(f"{each.unit.id}: {error}")
+            failures.append(error)
+    if failures:
+        raise InputError(
+            failures[0].subject,
+            f"{failures[0].reason}, so that {len(failures):,} of {len(shard):,} {unit}s failed",
+            f"{failures[0].remedy} The same command goes on with them.",
+        )
+    if len(shard) == len(units):
+        return found
+    of_all = completed(task, units)
+    return None if of_all is None else [each.content for each in of_all]
+
+
 def _by(
     executor: Submits, task: Task[UnitT, ResultT], units: Sequence[UnitT]
 ) -> Iterator[UnitResult[UnitT, ResultT]]:
@@ -214,16 +329,16 @@ def _by(
         future = executor.submit(do_unit, pickled, unit) if done is None else None
         waiting.append((unit, done, future))
         while waiting and (len(waiting) > AHEAD or waiting[0][2] is None or waiting[0][2].done()):
-            yield from _results(task, *waiting.popleft())
+            yield from _next_results(task, waiting)
     while waiting:
-        yield from _results(task, *waiting.popleft())
+        yield from _next_results(task, waiting)
 
 
-def _results(
-    task: Task[UnitT, ResultT], unit: UnitT, done: list[ResultT] | None, future: Any
+def _next_results(
+    task: Task[UnitT, ResultT], waiting: deque[tuple[UnitT, list[ResultT] | None, Any]]
 ) -> Iterator[UnitResult[UnitT, ResultT]]:
-    results = _awaited(task, unit, future) if done is None else done
-    for result in results:
+    unit, done, future = waiting.popleft()
+    for result in _awaited(task, unit, future) if done is None else done:
         yield UnitResult(unit, result, done is not None)
 
 

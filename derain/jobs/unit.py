@@ -1,6 +1,9 @@
-"""A part of a job that one process does by itself."""
+"""A part of a job that one process does by itself, and the record of what was done of it."""
 
 from dataclasses import dataclass
+from typing import Any
+
+from derain.errors import InputError
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -17,3 +20,33 @@ class Unit:
     id: str
     size: int
     inputs: str
+
+
+@dataclass(frozen=True)
+class Record:
+    """What was done of a unit.
+
+    Attributes:
+        unit: Id of the unit.
+        inputs: Fingerprint of what it read.
+        options: Fingerprint of the options of its job.
+        worker: Host and number of the process.
+        ended: When it ended, in ISO 8601, by the clock of its worker.
+        seconds: How long it took.
+        errors: What went wrong, as subject, reason and remedy each; empty where nothing did.
+        results: What came of it, as the job writes it.
+    """
+
+    unit: str
+    inputs: str
+    options: str
+    worker: str
+    ended: str
+    seconds: float
+    errors: list[list[str]]
+    results: list[Any]
+
+    @property
+    def failures(self) -> list[InputError]:
+        """What went wrong."""
+        return [InputError(*error) for error in self.errors]

@@ -4,12 +4,12 @@ import multiprocessing
 import pickle
 import signal
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
 from queue import SimpleQueue
-from typing import Any, ParamSpec, Self, TypeVar
+from typing import Any, Self, TypeVar
 
 from derain.errors import InputError
 from derain.system.memory import keep_freed_memory
@@ -18,8 +18,6 @@ from derain.system.workers import end_with_parent, without_main_module
 # A unit is tried so often while its process dies.
 TRIES = 3
 
-Given = ParamSpec("Given")
-Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
@@ -35,23 +33,6 @@ def processes(count: int) -> Iterator["WorkerPool | None"]:
     else:
         with WorkerPool(count) as pool:
             yield pool
-
-
-def each_by(
-    workers: int, work: Callable[[Item], Result], items: Sequence[Item]
-) -> Iterator[Result]:
-    """Has work done on each item, without records; yields the results in the order of the items.
-
-    Args:
-        workers: Number of processes; one is this process.
-        work: What is done.
-        items: What it is done on.
-
-    Raises:
-        InputError: A process always dies; or what the work raises.
-    """
-    with processes(workers) as pool:
-        yield from map(work, items) if pool is None else pool.map(work, items)
 
 
 class WorkerPool(ThreadPoolExecutor):
@@ -74,9 +55,7 @@ class WorkerPool(ThreadPoolExecutor):
             self._idle.put(worker)
         self._ended = False
 
-    def submit(
-        self, work: Callable[Given, Result], /, *given: Given.args, **named: Given.kwargs
-    ) -> Future[Result]:
+    def submit(self, work: Callable[..., Result], /, *given: Any, **named: Any) -> Future[Result]:
         """Has work done by the next process that is idle."""
         return super().submit(self._done, pickle.dumps((work, given, named)))
 

@@ -162,12 +162,12 @@ class PersistenceDerainer(RecordingMethod):
 
     def _judged(self, ready: FrameInWindow, stopwatch: Stopwatch) -> Judgement:
         scan, scans = ready.scans.scan, ready.scans
-        with stopwatch.stage("view"):
+        with ready.naming_errors(), stopwatch.stage("view"):
             for one in (scans.judged, *scans.before, *scans.after):
                 if one.scan not in self._points:
                     self._points[one.scan] = ScanPoints.of(one.scan, self.threads)
         points = self._points[scan]
-        with stopwatch.stage("network"):
+        with ready.naming_errors(), stopwatch.stage("network"):
             evidence = self._evidence(scans)
             alone = combined_log_odds(points, evidence)
             agreed = vote(points, alone)

@@ -1,11 +1,10 @@
 """Frames with poses: of a file, of a sensor that stands, or found by odometry."""
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.reading import reading
@@ -13,14 +12,37 @@ from derain.recordings.odometry import FrameOdometry, Registration
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.recordings import recordings_of
-from derain.sources.records import line_of
+from derain.sources.records import poses_along
 from derain.sources.source import Frames
-from derain.sources.trajectory import Trajectory, read_trajectory
+from derain.sources.stored_frame import StoredBag
+from derain.sources.trajectory import read_trajectory
+from derain.views.scan_issues import ScanIssue
 
 # What stands for poses that are in no file.
 STANDING, ODOMETRY = "standing", "odometry"
 
 OnRegistration = Callable[[Frame, Registration], None]
+
+
+@dataclass(frozen=True)
+class Odometry:
+    """Finds the poses of whole recordings, in the process that judges them.
+
+    Attributes:
+        threads: Threads that it may use; 0 takes every core.
+    """
+
+    threads: int = 0
+
+    def __call__(self, frames: Sequence[Frame]) -> list[tuple[Frame, list[ScanIssue]]]:
+        """Each frame with its pose, as :func:`with_poses` gives it, and what is odd about it."""
+        issues: list[list[ScanIssue]] = []
+
+        def note(frame: Frame, registration: Registration) -> None:
+            issues.append(list(registration.issues()))
+
+        posed = with_poses(frames, ODOMETRY, self.threads, note)
+        return list(zip(posed, issues, strict=True))
 
 
 def with_poses(
@@ -102,22 +124,14 @@ def _with_file_poses(source: Sequence[Frame], path: Path) -> Frames:
     posed: list[Frame] = []
     for recording in recordings:
         file = path / f"{recording[0].sequence}.txt" if folder else path
-        poses = _poses(recording, read_trajectory(file))
+        trajectory = read_trajectory(file)
+        bag = recording[0]
+        if isinstance(bag, StoredBag):  # whose clouds are known when it is fetched
+            posed.append(replace(bag, trajectory=trajectory))
+            continue
+        poses = poses_along(recording, trajectory)
         posed += [frame.with_pose(pose) for frame, pose in zip(recording, poses, strict=True)]
     return Frames(posed)
-
-
-def _poses(recording: Sequence[Frame], trajectory: Trajectory) -> Iterator[NDArray[np.float64]]:
-    """The pose of each frame."""
-    names = [Path(frame.name).name for frame in recording]
-    if trajectory.times is not None:  # else the scans' own are not read, damaged or not
-        times = [time for frame in recording if (time := frame.time) is not None]
-        if len(times) == len(recording) and trajectory.is_by_time(times):
-            yield from map(trajectory.at, times, names)
-            return
-    for place, name in enumerate(names):
-        record, lines = Path(trajectory.name), len(trajectory)
-        yield trajectory.poses[line_of(record, lines, name, place, len(recording))]
 
 
 def _scan_of(frame: Frame) -> Scan | None:

@@ -19,6 +19,9 @@ class RecordingMethod(Method):
             HELP: ClassVar[str] = "rain is what moves"
             ...
 
+    It may judge a frame that was pushed some frames ago. Inside
+    :meth:`derain.sources.recent_frames.FrameInWindow.naming_errors`, errors name that frame.
+
     Attributes:
         HELP: What rain is to the method, in one line for the help of commands.
     """

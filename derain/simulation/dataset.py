@@ -13,18 +13,16 @@ the second waits for the first; shards of one run do not wait for each other.
 import os
 import shutil
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
-
 from derain.errors import InputError
 from derain.files.atomic import lock, remove_abandoned, temporary_folder, writing
 from derain.jobs.job import FOLDER, Job, differences
-from derain.jobs.running import Submits, Task, Work, completed, run
+from derain.jobs.running import IsThere, Submits, Task, Value, ValueWork, values
 from derain.jobs.shard import Shard
 from derain.jobs.unit import Unit
 from derain.simulation.campaign import SplitSequences
@@ -35,13 +33,9 @@ from derain.simulation.manifest import (
     read_manifest,
     write_manifest,
 )
-from derain.system.notices import warn
 from derain.system.open3d_import import import_open3d
 
 SEQUENCES = "sequences"
-
-# The checksums of a sequence's files by their paths, or why it could not be simulated.
-Outcome = dict[str, str] | InputError
 
 
 def simulate_track(
@@ -87,46 +81,22 @@ def simulate_track(
             write_manifest(root, description)
         # Absolute, because other processes may work in another folder.
         work = SequenceWork(root.absolute(), campaign)
-        job = Job.begin(work.root, {"command": "simulate", **parameters_of(description)}, shard)
+        options = {"command": "simulate", **parameters_of(description)}
         units = [Unit(id=name, size=1, inputs="") for name in campaign.names]
-        job.list_units(units)
-        task = Task(job, work)
-        _run(task, job.shard_of(units, shard), executor)
-        outcomes = completed(task, units)
+        job = Job.begin(work.root, options, units, shard)
+        to_do = job.shard_of(units, shard)
+        outcomes = values(Task(job, work), units, to_do, executor, "simulating", "sequence")
         if outcomes is None:
             return False
         files: dict[str, str] = {}
         for checksums_of_sequence in outcomes:
-            assert isinstance(checksums_of_sequence, dict)  # none of them failed
             files |= checksums_of_sequence
         write_manifest(root, {**description, "files": files})
         return True
 
 
-def _run(task: Task[Unit, Outcome], units: Sequence[Unit], executor: Submits | None) -> None:
-    """Simulates sequences, and warns of each that cannot be simulated.
-
-    Raises:
-        InputError: There was one.
-    """
-    failures: list[InputError] = []
-    results = run(task, units, executor)
-    shown = tqdm(results, total=len(units), desc="simulating", unit="sequence", disable=None)
-    for each in shown:
-        if isinstance(each.result, InputError):
-            warn(f"{each.unit.id}: {each.result}")
-            failures.append(each.result)
-    if failures:
-        raise InputError(
-            failures[0].subject,
-            f"{failures[0].reason}, so that {len(failures):,} of {len(units):,} sequences could "
-            "not be simulated",
-            f"{failures[0].remedy} The same command goes on with them.",
-        )
-
-
 @dataclass(frozen=True)
-class SequenceWork(Work[Unit, Outcome]):
+class SequenceWork(ValueWork[Unit]):
     """Simulates sequences, whose names are the ids of the units.
 
     Attributes:
@@ -141,8 +111,8 @@ class SequenceWork(Work[Unit, Outcome]):
         """Refuses a process that cannot import Open3D."""
         import_open3d()
 
-    def do(self, unit: Unit) -> Iterator[Outcome]:
-        """Simulates a sequence, unless it is there; yields the checksums of its files."""
+    def value(self, unit: Unit) -> dict[str, str]:
+        """Simulates a sequence, unless it is there; returns the checksums of its files."""
         folder = self.root / SEQUENCES / unit.id
         if not folder.exists():
             with writing(self.root), temporary_folder(folder.parent) as temporary:
@@ -152,27 +122,11 @@ class SequenceWork(Work[Unit, Outcome]):
                 except OSError:
                     if not folder.is_dir():  # else another process was quicker, with the same bytes
                         raise
-        yield checksums(folder, self.root)
+        return checksums(folder, self.root)
 
-    def is_there(self, unit: Unit) -> bool:
-        """Whether the sequence is there."""
-        return (self.root / SEQUENCES / unit.id).is_dir()
-
-    def failed(self, unit: Unit, error: InputError) -> Iterator[Outcome]:
-        """Why a sequence could not be simulated."""
-        yield error
-
-    def error_of(self, result: Outcome) -> InputError | None:
-        """Why a sequence could not be simulated; None where it was."""
-        return result if isinstance(result, InputError) else None
-
-    def to_json(self, result: Outcome) -> Any:
-        """The checksums, as they are."""
-        return result
-
-    def from_json(self, unit: Unit, written: Any) -> Outcome:
-        """The checksums, as they are."""
-        return dict(written)
+    def look(self) -> IsThere[Unit, Value]:
+        """Whether a sequence is there."""
+        return lambda unit, values: (self.root / SEQUENCES / unit.id).is_dir()
 
 
 def _remove(root: Path) -> None:

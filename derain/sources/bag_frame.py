@@ -26,10 +26,12 @@ class BagFrame(FileFrame):
     """A cloud in a bag, at a path as if the bag were a folder of its topics.
 
     Attributes:
-        clouds: The clouds of its topic, of which it is the one of its number.
+        clouds: The clouds of its topic.
+        cloud_number: Which of them it is, from 0, also where its place in its sequence is another.
     """
 
     clouds: CloudTopic
+    cloud_number: int
 
     @property
     def suffix(self) -> str:
@@ -40,16 +42,16 @@ class BagFrame(FileFrame):
     def label_beside_bag(self) -> Path:
         """Path of its labels: ``drive.labels/000012.label`` beside the bag."""
         bag = self.clouds.bag.path
-        return bag.with_name(stem(bag) + LABELS_SUFFIX) / f"{self.number:06d}{LABEL}"
+        return bag.with_name(stem(bag) + LABELS_SUFFIX) / f"{self.cloud_number:06d}{LABEL}"
 
     @property
     def time(self) -> float:
         """When it was taken, seconds: the stamp of its header, or if that is 0, of the bag."""
-        return self.clouds.seconds(self.number)
+        return self.clouds.seconds(self.cloud_number)
 
     def read(self) -> Scan:
         """Reads the scan, without labels."""
-        cloud = self.clouds.cloud(self.number).cloud
+        cloud = self.clouds.cloud(self.cloud_number).cloud
         try:
             scan = scan_of_cloud(self.path, cloud)
         except ValueError as error:
@@ -60,7 +62,7 @@ class BagFrame(FileFrame):
 
     def count_points(self) -> int:
         """Number of points of the cloud."""
-        return len(self.clouds.cloud(self.number).cloud)
+        return len(self.clouds.cloud(self.cloud_number).cloud)
 
     def fingerprint(self) -> str:
         """First 16 hexadecimal digits of the SHA-256 of its message."""
@@ -72,8 +74,9 @@ class BagFrame(FileFrame):
             return sum(map(file_size, self._files())) // max(len(self.clouds), 1)
 
     def stamp(self) -> str:
-        """Size and time of change of the files of its bag, and its place in it."""
-        return " ".join([*map(stamp_of, self._files()), self.clouds.topic.name, str(self.number)])
+        """Size and time of change of the files of its bag and its labels; its place in the bag."""
+        place = [self.clouds.topic.name, str(self.cloud_number)]
+        return " ".join([*map(stamp_of, self._files()), *place]) + self._label_stamp()
 
     def _files(self) -> list[Path]:
         """The files of its bag."""
@@ -81,7 +84,7 @@ class BagFrame(FileFrame):
         return sorted(filter(Path.is_file, bag.iterdir())) if bag.is_dir() else [bag]
 
     def _checksum(self) -> str:
-        return sha256(self.clouds.message(self.number).data).hexdigest()
+        return sha256(self.clouds.message(self.cloud_number).data).hexdigest()
 
 
 def bag_frames(path: Path, labelled: bool = False, by_name: bool = False) -> list[BagFrame]:
@@ -124,6 +127,7 @@ def bag_frame(clouds: CloudTopic, number: int, key: str) -> BagFrame:
         number=number,
         path=Path(clouds.name_of(number)),
         clouds=clouds,
+        cloud_number=number,
     )
     return replace(frame, label_path=frame.label_beside_bag)
 

@@ -19,6 +19,7 @@ from derain.sources.sink import FolderSink
 from derain.sources.source import Source
 from derain.sources.stored_frame import StoredBag
 from derain.stores.mirror import uploaded
+from derain.stores.objects import stamps_at
 from derain.stores.url import Place, is_url, is_web, path_of, url_of, without_secrets
 
 
@@ -173,32 +174,48 @@ class Destination:
         return is_url(self.folder) or (self.removed is not None and is_url(self.removed))
 
     @contextmanager
-    def opened(self, source: Source) -> Iterator[CleanSink]:
+    def opened(self, source: Source) -> Iterator[tuple[CleanSink, dict[str, str]]]:
         """Lends a sink; what it writes is at its place when the block has ended well.
 
         Args:
             source: The scans.
 
+        Yields:
+            The sink; and the sizes and versions of what is uploaded, by path, after the block.
+
         Raises:
             InputError: A folder or a store that cannot be written, or what CleanSink refuses.
         """
+        stamps: dict[str, str] = {}
         with ExitStack() as stack:
-            folder = stack.enter_context(uploaded(self.folder))
+            folder = stack.enter_context(uploaded(self.folder, stamps))
             removed = None
             if self.removed is not None:
-                removed = stack.enter_context(uploaded(self.removed))
-            yield stack.enter_context(self._sink(folder, removed, source))
+                removed = stack.enter_context(uploaded(self.removed, stamps))
+            yield stack.enter_context(self._sink(folder, removed, source)), stamps
+
+    def stamps(self) -> dict[str, str]:
+        """Sizes and versions of what is there in stores, by path.
+
+        Raises:
+            InputError: A store that cannot be reached.
+        """
+        found: dict[str, str] = {}
+        for place in (self.folder, self.removed):
+            if place is not None and is_url(place):
+                found |= stamps_at(str(place))
+        return found
 
     def holds(self, source: Source) -> bool:
-        """Whether everything is there that is written of scans; of a store, their record says so.
+        """Whether all files are there that are written of scans, but for those in stores.
 
         Args:
             source: The scans.
         """
-        if self.is_stored:
+        if is_url(self.folder) and (self.removed is None or is_url(self.removed)):
             return True
         sink = self._sink(self.folder, self.removed, source)
-        return all(path.exists() for path in sink.targets())
+        return all(path.exists() or is_url(url_of(path)) for path in sink.targets())
 
     def _sink(self, folder: Place, removed: Place | None, source: Source) -> CleanSink:
         return CleanSink(

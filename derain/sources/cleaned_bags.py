@@ -119,7 +119,7 @@ class CleanedBags:
             raise next(iter(self._broken.values()))
 
     def _write(self, copy: BagCopy, frame: BagFrame, judgement: Judgement) -> None:
-        recorded = copy.forward_to(frame.number)
+        recorded = copy.forward_to(frame.cloud_number)
         try:
             message = CloudMessage.parse(recorded.data, frame.clouds.topic.encoding)
             clean, removed = self._divided(message.cloud, judgement)

@@ -1,17 +1,26 @@
-"""What was done to a scan, in figures and as its record has it."""
+"""What was done to scans, one by one, as records have it, and added up."""
 
 import base64
+import math
 import zlib
-from dataclasses import asdict, dataclass, replace
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from datetime import UTC, datetime
+from pathlib import PurePosixPath
 from typing import Any, Self
 
 import numpy as np
 
 from derain.errors import InputError, printable
+from derain.jobs.unit import Record
 from derain.sources.frame import Frame
 from derain.views.scan_issues import ScanIssue
 from derain.weather.record import WeatherRecord
 from derain.weather.scan_weather import ScanWeather
+
+# Seconds from which on times are those of Unix: no recording takes thirty years.
+UNIX_TIMES_FROM = 1e9
 
 
 @dataclass(frozen=True)
@@ -66,6 +75,8 @@ class ScanOutcome:
         seconds: When it was taken, seconds; None where that is not known.
         packed: The weather that it shows, as text; None where it was not measured.
         error: Why it could not be cleaned; None where it was.
+        recording: The unbroken recording that it is of, where only its unit shows that.
+        uploaded: Sizes and versions of what its unit uploaded, by path, with the last scan of it.
     """
 
     frame: Frame
@@ -74,6 +85,8 @@ class ScanOutcome:
     seconds: float | None = None
     packed: str | None = None
     error: InputError | None = None
+    recording: str | None = None
+    uploaded: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def figures(self) -> CleanedScan:
@@ -90,16 +103,59 @@ class ScanOutcome:
         """The same, whose figures have those of the weather."""
         return replace(self, cleaned=replace(self.figures, weather=weather))
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """The outcome of a cleaned scan as the record of its unit has it."""
-        figures = asdict(self.figures)
-        del figures["weather"]  # that of a recording depends on the scans before
+        cleaned = asdict(self.figures)
+        del cleaned["weather"]  # that of a recording depends on the scans before
         return {
-            **figures,
+            "cleaned": cleaned,
             "key": self.frame.key,
             "seconds": self.seconds,
             "measured": self.packed,
+            "recording": self.recording,
+            "uploaded": dict(self.uploaded),
         }
+
+
+class CleanedTotals:
+    """Adds up the records of units.
+
+    Attributes:
+        scans: Number of cleaned scans.
+        points: Number of their points.
+        valid: Number of points that can be judged.
+        rain: Number of removed points.
+        by_hour: The weather of the measured scans of each hour, by its name: a date and an hour in
+            UTC, or else the recording and the hour in it.
+    """
+
+    def __init__(self) -> None:
+        self.scans = self.points = self.valid = self.rain = 0
+        self.by_hour: dict[str, ScanWeather] = defaultdict(ScanWeather.none)
+
+    def add(self, record: Record) -> None:
+        """Adds the scans of a unit."""
+        for scan in record.results:
+            self.scans += 1
+            cleaned = scan["cleaned"]
+            self.points += cleaned["points"]
+            self.valid += cleaned["valid"]
+            self.rain += cleaned["rain"]
+            if scan["measured"] is not None:
+                hour = _hour(scan["seconds"], PurePosixPath(record.unit).parent.as_posix())
+                self.by_hour[hour] += unpacked(scan["measured"])
+
+    def worst_hours(self, most: int = 3) -> list[tuple[str, ScanWeather]]:
+        """The hours with the shortest visibility, the worst first.
+
+        Args:
+            most: At most so many.
+        """
+        known = [each for each in self.by_hour.items() if each[1].visibility.known]
+        return sorted(known, key=lambda each: each[1].visibility.shown)[:most]
+
+    def __str__(self) -> str:
+        return f"{self.scans:,} scans: {counts(self.points, self.valid, self.rain)}"
 
 
 def counts(points: int, valid: int, rain: int) -> str:
@@ -120,3 +176,16 @@ def unpacked(text: str) -> ScanWeather:
     shape = ScanWeather.none().ends.shape
     ends = np.frombuffer(zlib.decompress(base64.b64decode(text)), "<i8").reshape(shape)
     return ScanWeather(ends.astype(np.int64))
+
+
+def _hour(seconds: float | None, recording: str) -> str:
+    """The hour of a time, by its date, or within its recording."""
+    of_recording = "" if recording == "." else f"{recording}, "
+    if seconds is None or not math.isfinite(seconds):
+        return f"{of_recording}without times"
+    if seconds < UNIX_TIMES_FROM:
+        return f"{of_recording}hour {int(seconds // 3600)}"
+    try:
+        return datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%d %H:00 UTC")
+    except (OverflowError, ValueError, OSError):  # for instance nanoseconds
+        return f"{of_recording}without times in seconds"

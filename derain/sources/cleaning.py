@@ -1,26 +1,25 @@
 """Cleans the scans of a source, and reports what was done."""
 
 from collections import Counter
-from collections.abc import Iterator
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from tqdm import tqdm
 
 from derain.errors import InputError
-from derain.jobs.job import Job
 from derain.jobs.running import Submits, Task, UnitResult, run
 from derain.sources.clean_sink import CleanSink
 from derain.sources.cleaned_scan import CleanedScan, ScanOutcome, counts
-from derain.sources.file_frame import FileFrame
 from derain.sources.folders import GivenScans, source_of
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
 from derain.sources.source import Source
 from derain.sources.stored_frame import StoredFrame
 from derain.sources.unit_cleaning import UnitCleaning
-from derain.sources.units import Division, FrameUnit, units_of, whole
+from derain.sources.unit_judging import Placing
+from derain.sources.units import Division, folder_of_paths, units_of, whole
 from derain.sources.weather_monitor import WeatherMonitor, WeatherOptions
 from derain.views.scan_issues import MOST_RAIN, ScanIssue
 
@@ -84,6 +83,7 @@ def clean(
     method: Method,
     sink: CleanSink | Path | str,
     *,
+    placing: Placing | None = None,
     most_removed: float = MOST_RAIN,
     weather: WeatherOptions = WeatherOptions(),
     observer: CleaningObserver = CleaningObserver(),
@@ -103,6 +103,9 @@ def clean(
         source: A source; or one or more scans, frames, files and folders, in time order.
         method: A model, a filter, or a method that sees several scans.
         sink: Folder or URL to write to, or a sink with its options, opened by ``with``.
+        placing: Finds where the scans of whole recordings were taken, in the process that cleans
+            them, such as :class:`derain.recordings.posed.Odometry`. None leaves the frames as they
+            are.
         most_removed: Scans with a greater share of rain in their valid points are not written.
         weather: How the weather is measured.
         observer: Follows the cleaning.
@@ -121,26 +124,34 @@ def clean(
             written; records of other options in the folder; an executor that has ended.
     """
     source = source_of(source)
-    monitor = WeatherMonitor(weather, source)
+    monitor = WeatherMonitor(weather, source, knows_recordings=placing is None)
     sample = None if weather.every_scan else monitor.sample
     cleaned: list[CleanedScan] = []
     failures: list[InputError] = []
     before = 0
     with nullcontext(sink) if isinstance(sink, CleanSink) else CleanSink(sink, source) as opened:
-        work = UnitCleaning(method, "", opened.destination, most_removed, sample)
+        finds_recordings = placing is not None and weather.every_scan
+        work = UnitCleaning(
+            method, "", placing, opened.destination, most_removed, sample, finds_recordings
+        )
         if executor is not None or _is_stored(source, opened):
             division = replace(division or Division(), keep_records=True)
         if division is not None and division.keeps_records(source, opened.destination.folder):
             work = replace(work, fingerprint=method.fingerprint())
-            job = _job(source, work, opened, division)
-            units = units_of(source, method, division.block)
-            job.list_units(units)
-            units = job.shard_of(units, division.shard)
-            task = Task(job, work, _folder_of_paths(source, opened))
-            outcomes = _counted(run(task, units, executor), opened)
+            block = division.block if placing is None else len(source)  # whole recordings
+            job, units = division.begin(
+                opened.destination.folder,
+                _options(source, work, opened, division),
+                units_of(source, method, block),
+            )
+            written_to = () if opened.destination.is_stored else (opened.folder,)
+            task = Task(job, work, folder_of_paths(source, *written_to))
+            outcomes, in_units = run(task, units, executor), True
         else:
             units = [whole(source)]
-            outcomes = _at_once(units[0], work, opened, observer)
+            cleaning = work.clean(units[0], opened, observer.judged)
+            outcomes = (UnitResult(units[0], outcome, before=False) for outcome in cleaning)
+            in_units = False
         scans = sum(len(unit.frames) for unit in units)
         found = Counter[str]()
         for result in tqdm(outcomes, total=scans, unit="scan", disable=None):
@@ -151,8 +162,10 @@ def clean(
                 failures.append(outcome.error)
                 observer.failed(outcome.error)
                 continue
+            if in_units:  # else the sink has written it, and counts itself
+                opened.count()
             if (measured := outcome.measured) is not None:
-                record = monitor.add(outcome.frame, measured)
+                record = monitor.add(outcome.frame, measured, outcome.recording)
                 outcome = outcome.with_weather(record)
             if result.before:
                 observer.found(outcome)
@@ -166,40 +179,16 @@ def clean(
     return CleanReport(cleaned, failures, monitor, before, not_cleaned)
 
 
-def _at_once(
-    unit: FrameUnit, work: UnitCleaning, sink: CleanSink, observer: CleaningObserver
-) -> Iterator[UnitResult[FrameUnit, ScanOutcome]]:
-    """Cleans scan after scan, without records."""
-    for outcome in work.clean(unit, sink, observer.judged):
-        yield UnitResult(unit, outcome, before=False)
-
-
-def _folder_of_paths(source: Source, sink: CleanSink) -> Path | None:
-    """The folder that relative paths begin in; None where there are none."""
-    files = [each for each in source if isinstance(each, FileFrame)]
-    paths = [each.path for each in files if not isinstance(each, StoredFrame)]
-    paths += [] if sink.destination.is_stored else [sink.folder]
-    return None if all(path.is_absolute() for path in paths) else Path.cwd()
-
-
 def _is_stored(source: Source, sink: CleanSink) -> bool:
     """Whether scans are read from an object store, or written to one."""
     return sink.destination.is_stored or any(isinstance(each, StoredFrame) for each in source)
 
 
-def _counted(
-    results: Iterator[UnitResult[FrameUnit, ScanOutcome]], sink: CleanSink
-) -> Iterator[UnitResult[FrameUnit, ScanOutcome]]:
-    """The same, whose written scans a sink counts that does not write them itself."""
-    for result in results:
-        if result.result.error is None:
-            sink.count()
-        yield result
-
-
-def _job(source: Source, work: UnitCleaning, sink: CleanSink, division: Division) -> Job:
-    """Begins a job, or goes on with the one of the folder, by all that the results depend on."""
-    options = {
+def _options(
+    source: Source, work: UnitCleaning, sink: CleanSink, division: Division
+) -> dict[str, Any]:
+    """All that the results depend on but the scans."""
+    return {
         **work.options("run", source, division.block),
         **sink.options,
         "most_removed": work.most_removed,
@@ -207,4 +196,3 @@ def _job(source: Source, work: UnitCleaning, sink: CleanSink, division: Division
             "of every scan" if work.measured is None else "of some scans"
         ),
     }
-    return Job.begin(sink.destination.folder, options, division.shard, division.anew)

@@ -11,7 +11,7 @@ from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS, count_points, read_scan
 from derain.files.labels import read_labels, semantic
 from derain.files.names import scan_stem
-from derain.files.reading import file_size, read_bytes, reading, stamp_of
+from derain.files.reading import file_size, is_file, read_bytes, reading, stamp_of
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.records import Records
@@ -96,9 +96,13 @@ class FileFrame(Frame):
             return file_size(self.path)
 
     def stamp(self) -> str:
-        """Size and time of change of its file, and of the records beside it."""
+        """Size and time of change of its file, its labels, and the records beside it."""
         of_records = "" if self.records is None else self.records.stamp
-        return f"{stamp_of(self.path)} {of_records}"
+        return f"{stamp_of(self.path)} {of_records}{self._label_stamp()}"
+
+    def _label_stamp(self) -> str:
+        labels = self.label_path
+        return f" {stamp_of(labels)}" if labels is not None and is_file(labels) else ""
 
     def _checksum(self) -> str:
         return _sha256(self.path)

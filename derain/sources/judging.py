@@ -9,14 +9,17 @@ from derain.files.reading import reading
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
+from derain.sources.recent_frames import ScanError
 from derain.system.stopwatch import Stopwatch
 
 # Surrounds the work on a frame, so that one that fails can be reported and passed over.
 Guard = Callable[[Frame], AbstractContextManager[None]]
 
-
 # A frame, its judgement, and the times of the stages since the answer before.
 Answer = tuple[Frame, Judgement, Stopwatch]
+
+# The same, where a frame may have an error in place of a judgement.
+AnswerOrError = tuple[Frame, Judgement | InputError, Stopwatch]
 
 
 def unguarded(frame: Frame) -> AbstractContextManager[None]:
@@ -61,7 +64,7 @@ def judgements(
     Args:
         method: The method.
         frames: Frames in time order, one sequence after the other.
-        guard: Surrounds the work on each; where it holds an error back, the frame has no answer.
+        guard: Surrounds the error of each; where it holds the error back, the frame has no answer.
 
     Yields:
         Each frame with its judgement, in the order of the frames.
@@ -69,27 +72,56 @@ def judgements(
     Raises:
         InputError: A frame that cannot be read or judged, where the guard lets that through.
     """
+    for frame, answer, stopwatch in answers(method, frames):
+        if isinstance(answer, InputError):
+            with guard(frame):
+                raise answer
+        else:
+            yield frame, answer, stopwatch
+
+
+def answers(method: Method, frames: Iterable[Frame]) -> Iterator[AnswerOrError]:
+    """Judges the frames of recordings, and goes on after those that cannot be read or judged.
+
+    Args:
+        method: The method.
+        frames: Frames in time order, one sequence after the other.
+
+    Yields:
+        Each frame as soon as it is judged or met by an error.
+    """
     last = None
     for frame in frames:
         if last is not None and method.starts_new_recording(frame):
-            yield from _flushed(method, last, guard)
+            yield from _flushed(method, last)
         last, judgement, stopwatch = frame, None, Stopwatch()
-        with guard(frame):
-            judgement = method.push(frame, stopwatch)
+        try:
+            with reading(Path(frame.name)):  # which names the file where the memory is full
+                judgement = method.push(frame, stopwatch)
+        except InputError as error:
+            yield _met_by(error, frame), error, stopwatch
         if judgement is not None:
             yield _frame_of(judgement), judgement, stopwatch
     if last is not None:
-        yield from _flushed(method, last, guard)
+        yield from _flushed(method, last)
 
 
-def _flushed(method: Method, last: Frame, guard: Guard) -> Iterator[Answer]:
+def _flushed(method: Method, last: Frame) -> Iterator[AnswerOrError]:
     """The answers for the frames that wait, after the last of a recording was pushed."""
     while method.waiting:  # where one fails, the others go on waiting
-        with guard(last):
-            stopwatch = Stopwatch()
-            for judgement in method.flush(stopwatch):
-                yield _frame_of(judgement), judgement, stopwatch
-                stopwatch.milliseconds.clear()
+        stopwatch = Stopwatch()
+        try:
+            with reading(Path(last.name)):
+                for judgement in method.flush(stopwatch):
+                    yield _frame_of(judgement), judgement, stopwatch
+                    stopwatch.milliseconds.clear()
+        except InputError as error:
+            yield _met_by(error, last), error, stopwatch
+
+
+def _met_by(error: InputError, pushed: Frame) -> Frame:
+    """The frame that an error is about: the one that was judged, or else the one pushed last."""
+    return error.frame if isinstance(error, ScanError) else pushed
 
 
 def _frame_of(judgement: Judgement) -> Frame:

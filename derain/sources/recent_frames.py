@@ -1,8 +1,13 @@
 """The frames of a recording that a window needs, kept as they come in."""
 
 from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
+from derain.errors import InputError
+from derain.files.reading import reading
 from derain.sources.frame import Frame
 from derain.views.window import PlacedScan, Window, WindowOfScans
 
@@ -18,6 +23,40 @@ class FrameInWindow:
 
     frame: Frame
     scans: WindowOfScans
+
+    @contextmanager
+    def naming_errors(self) -> Iterator[None]:
+        """Has the errors of the block, which judges it, name the frame.
+
+        Raises:
+            ScanError: In place of another InputError, or where the memory is full.
+        """
+        try:
+            with reading(Path(self.frame.name)):
+                yield
+        except InputError as error:
+            raise ScanError(self.frame, error) from error
+
+
+class ScanError(InputError):
+    """A frame that was pushed, perhaps some frames ago, and cannot be judged.
+
+    Args:
+        frame: The frame.
+        error: Why; of an error that does not name the frame, the reason begins with its subject.
+
+    Attributes:
+        frame: The frame.
+    """
+
+    def __init__(self, frame: Frame, error: InputError) -> None:
+        named = str(error.subject) == frame.name
+        reason = error.reason if named else f"{error.subject}: {error.reason}"
+        super().__init__(frame.name, reason, error.remedy)
+        self.frame = frame
+
+    def __reduce__(self) -> tuple[type[InputError], tuple[str | Path, str, str]]:
+        return InputError, (self.subject, self.reason, self.remedy)
 
 
 class RecentFrames:

@@ -4,7 +4,7 @@
 - ``poses.txt``: a line a scan, or poses by time; see :mod:`derain.sources.trajectory`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, lru_cache
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from derain.files import find_scans
 from derain.files.frame_times import METADATA, read_frame_times
 from derain.files.names import scan_stem
 from derain.files.reading import is_file, stamp_of
+from derain.sources.frame import Frame
 from derain.sources.number_lines import read_numbers
 from derain.sources.trajectory import CALIBRATION, Trajectory, read_trajectory
 
@@ -107,6 +108,29 @@ class Records:
 def records_of(folder: Path) -> Records:
     """The records of a folder, which frames that come from another process share."""
     return Records(folder)
+
+
+def poses_along(
+    recording: Sequence[Frame], trajectory: Trajectory
+) -> Iterator[NDArray[np.float64]]:
+    """The pose of each frame of a recording, float64 (4, 4), metres.
+
+    Args:
+        recording: The frames.
+        trajectory: Poses by time where the scans have times of the same clock, else line by line.
+
+    Raises:
+        InputError: It does not fit the scans.
+    """
+    names = [Path(frame.name).name for frame in recording]
+    if trajectory.times is not None:  # else the scans' own are not read, damaged or not
+        times = [time for frame in recording if (time := frame.time) is not None]
+        if len(times) == len(recording) and trajectory.is_by_time(times):
+            yield from map(trajectory.at, times, names)
+            return
+    for place, name in enumerate(names):
+        record, lines = Path(trajectory.name), len(trajectory)
+        yield trajectory.poses[line_of(record, lines, name, place, len(recording))]
 
 
 def line_of(record: Path, lines: int, scan: str, place: int | None, scans: int) -> int:

@@ -124,7 +124,7 @@ class _Listing:
         if folder not in self._stamps:
             places = (place / name for place in (folder, folder.parent) for name in RECORDS)
             there = (self._objects[place] for place in places if place in self._objects)
-            self._stamps[folder] = " ".join(f"{each.size}-{each.version}" for each in there)
+            self._stamps[folder] = " ".join(each.stamp for each in there)
         return self._stamps[folder]
 
     def _recorded(self, value: Callable[[], Value]) -> Value | InputError:

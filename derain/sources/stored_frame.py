@@ -1,8 +1,6 @@
 """Scans and bags in object stores as frames, which are fetched to be read."""
 
 from abc import abstractmethod
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Self, TypeVar
@@ -12,8 +10,11 @@ from numpy.typing import NDArray
 
 from derain.bags.names import ROS1_SUFFIX, stem
 from derain.errors import InputError
+from derain.files import read_scan
 from derain.scan import Scan
 from derain.sources.file_frame import FileFrame
+from derain.sources.records import poses_along
+from derain.sources.trajectory import Trajectory
 from derain.stores.mirror import Mirror, mirror
 from derain.stores.objects import StoredObject
 from derain.stores.url import path_of
@@ -48,7 +49,7 @@ class StoredFrame(FileFrame):
 
     def stamp(self) -> str:
         """Sizes and versions of its objects."""
-        return " ".join(f"{stored.size}-{stored.version}" for stored in self.objects)
+        return " ".join(stored.stamp for stored in self.objects)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -81,23 +82,11 @@ class StoredScan(StoredFrame):
 
     def read(self) -> Scan:
         """Reads the scan, without labels."""
-        with self._fetched() as scan:
-            return replace(scan.read(), name=self.name)
-
-    def count_points(self) -> int:
-        """Number of points of the scan."""
-        with self._fetched() as scan:
-            return scan.count_points()
-
-    def fingerprint(self) -> str:
-        """A fingerprint of the content of its file, 16 hexadecimal digits."""
-        with self._fetched() as scan:
-            return scan.fingerprint()
-
-    def checksums(self) -> tuple[str, str | None]:
-        """SHA-256 of its file, in hexadecimal digits."""
-        with self._fetched() as scan:
-            return scan.checksums()
+        if self.file is not None:
+            return self._scan_in(self.file)
+        with mirror() as where:
+            where.fetch(self.objects)
+            return self._scan_in(where.root / self.path)
 
     def stamp(self) -> str:
         """Size and version of its object, and of the records beside it."""
@@ -107,20 +96,10 @@ class StoredScan(StoredFrame):
         """The scan in its file on this machine."""
         return [replace(self, file=where.root / self.path)]
 
-    @contextmanager
-    def _fetched(self) -> Iterator[FileFrame]:
-        """Lends the frame of its file on this machine."""
-        if self.file is not None:
-            yield self._at(self.file)
-            return
-        with mirror() as where:
-            where.fetch(self.objects)
-            yield self._at(where.root / self.path)
-
-    def _at(self, file: Path) -> FileFrame:
-        return FileFrame(
-            key=self.key, path=file, columns=self.columns, intensity_scale=self.intensity_scale
-        )
+    def _scan_in(self, file: Path) -> Scan:
+        """Reads the scan from its file on this machine."""
+        scan = read_scan(file, self.columns).with_intensity_times(self.intensity_scale)
+        return replace(scan, name=self.name)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -131,11 +110,13 @@ class StoredBag(StoredFrame):
         inner: The topic, as a part of a path; empty where the bag has only one of clouds.
         by_name: Whether keys of clouds begin with the stem of the bag.
         seconds: When the cloud was taken that it stands for; None where it stands for all.
+        trajectory: Poses of the clouds, where they are given.
     """
 
     inner: str = ""
     by_name: bool = False
     seconds: float | None = None
+    trajectory: Trajectory | None = None
 
     @property
     def suffix(self) -> str:
@@ -157,7 +138,7 @@ class StoredBag(StoredFrame):
         from derain.sources.bag_frame import bag_frames
 
         clouds = bag_frames(where.root / self.path / self.inner, by_name=self.by_name)
-        return [
+        frames: list[FileFrame] = [
             replace(
                 cloud,
                 path=cloud.path.relative_to(where.root),
@@ -166,6 +147,15 @@ class StoredBag(StoredFrame):
             )
             for cloud in clouds
         ]
+        if self.trajectory is None:
+            return frames
+        poses = poses_along(frames, self.trajectory)
+        return [frame.with_pose(pose) for frame, pose in zip(frames, poses, strict=True)]
+
+    def stamp(self) -> str:
+        """Sizes and versions of its objects, and a fingerprint of the poses that are given."""
+        given = "" if self.trajectory is None else self.trajectory.fingerprint()
+        return f"{super().stamp()} {given}"
 
     def cloud(self, key: str, name: str, seconds: float | None) -> Self:
         """One of its clouds, of which only that is known.

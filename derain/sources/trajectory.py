@@ -12,6 +12,7 @@ al., "A Benchmark for the Evaluation of RGB-D SLAM Systems", IROS 2012, for TUM'
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -56,6 +57,11 @@ class Trajectory:
 
     def __len__(self) -> int:
         return len(self.poses)
+
+    def fingerprint(self) -> str:
+        """A fingerprint of poses and times, hexadecimal digits."""
+        times = b"" if self.times is None else self.times.tobytes()
+        return sha256(self.poses.tobytes() + times).hexdigest()
 
     def is_by_time(self, times: Sequence[float] | NDArray[np.float64]) -> bool:
         """Whether scans find their poses by time: both have times, of one clock it seems.

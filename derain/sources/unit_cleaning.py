@@ -2,31 +2,22 @@
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 from derain.errors import InputError
-from derain.files.reading import reading
+from derain.jobs.running import IsThere
 from derain.sources.clean_sink import CleanSink, Destination
 from derain.sources.cleaned_scan import CleanedScan, ScanOutcome, packed
-from derain.sources.fetched_unit import fetched
 from derain.sources.frame import Frame, time_of
 from derain.sources.judgement import Judgement
-from derain.sources.method import Method
 from derain.sources.source import Frames
 from derain.sources.spread import evenly_spaced
 from derain.sources.stored_frame import StoredBag
 from derain.sources.unit_judging import UnitJudging
 from derain.sources.units import FrameUnit
-from derain.sources.weather_monitor import SAMPLED_SCANS
+from derain.sources.weather_monitor import SAMPLED_SCANS, recording_numbers
 from derain.system.stopwatch import Stopwatch
-from derain.views.scan_issues import (
-    HEAVIEST_RAIN,
-    ScanIssue,
-    left_out,
-    much_removed,
-    no_points,
-)
+from derain.views.scan_issues import HEAVIEST_RAIN, left_out, much_removed, no_points
 
 # Receives the judgement of each scan before it is written.
 OnJudgement = Callable[[Judgement], None]
@@ -40,26 +31,30 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
         destination: Where they are written, and what is written of them.
         most_removed: Scans with a greater share of rain in their valid points are not written.
         measured: Keys of the scans whose weather is measured; None measures all.
+        finds_recordings: Whether only the unit shows which of its scans follow one another.
     """
 
     destination: Destination
     most_removed: float
     measured: Collection[str] | None
+    finds_recordings: bool = False
 
     def do(self, unit: FrameUnit) -> Iterator[ScanOutcome]:
         """Cleans the scans of a unit."""
         held: list[ScanOutcome] = []
         with (
-            fetched(unit) as (here, with_urls),
-            self.destination.opened(Frames(here.frames)) as sink,
+            unit.fetched() as (here, with_urls),
+            self.destination.opened(Frames(here.frames)) as (sink, uploaded),
         ):
-            for outcome in self._measuring(unit, here).clean(here, sink):
+            for outcome in self._knowing_clouds(unit, here).clean(here, sink):
                 if outcome.error is not None:
                     outcome = replace(outcome, error=with_urls(outcome.error))
                 if self.destination.is_stored:  # what is not uploaded yet is not done
                     held.append(outcome)
                 else:
                     yield outcome
+        if held:
+            held[-1] = replace(held[-1], uploaded=uploaded)
         yield from held
 
     def clean(
@@ -75,65 +70,73 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
         Yields:
             What became of each scan.
         """
-        for frame, answer in self.judged(unit):
-            if isinstance(answer, InputError):
-                yield ScanOutcome(frame, [], error=answer)
-                continue
-            _, judgement, stopwatch = answer
+
+        def result(frame: Frame, judgement: Judgement, stopwatch: Stopwatch) -> ScanOutcome:
             on_judgement(judgement)
-            try:
-                with reading(Path(frame.name)):  # which names the file where the memory is full
-                    outcome = self._cleaned(frame, judgement, stopwatch, sink)
-            except InputError as error:
-                outcome = ScanOutcome(frame, [], error=error)
-            yield outcome
+            return self._cleaned(frame, judgement, stopwatch, sink)
 
-    def is_there(self, unit: FrameUnit) -> bool:
-        """Whether all files and bags of the unit are there."""
-        return self.destination.holds(Frames(unit.frames))
+        placed, doubts = self.placed(unit)
+        numbers = recording_numbers(placed.frames) if self.finds_recordings else {}
+        for outcome in self.results(placed, result):
+            key = outcome.frame.key
+            yield replace(
+                outcome,
+                issues=[*doubts.get(key, ()), *outcome.issues],
+                recording=f"{unit.id} {numbers[key]}" if key in numbers else None,
+            )
 
-    def failed(self, unit: FrameUnit, error: InputError) -> Iterator[ScanOutcome]:
-        """The outcome of a unit that failed as a whole, which is that of its first scan."""
-        yield ScanOutcome(unit.frames[0], [], error=error)
+    def look(self) -> IsThere[FrameUnit, ScanOutcome]:
+        """Looks at what is written by now."""
+        stamps = self.destination.stamps()
 
-    def error_of(self, outcome: ScanOutcome) -> InputError | None:
-        """Why a scan was not cleaned."""
-        return outcome.error
+        def is_there(unit: FrameUnit, outcomes: list[ScanOutcome]) -> bool:
+            uploaded = [item for outcome in outcomes for item in outcome.uploaded.items()]
+            stored = all(stamps.get(path) == stamp for path, stamp in uploaded)
+            return stored and self.destination.holds(Frames(unit.frames))
 
-    def to_json(self, outcome: ScanOutcome) -> dict[str, Any]:
-        """The outcome of a cleaned scan as a record has it."""
-        return outcome.as_dict()
+        return is_there
+
+    def failure(self, frame: Frame, error: InputError) -> ScanOutcome:
+        """The outcome of a scan that failed."""
+        return ScanOutcome(frame, [], error=error)
 
     def from_json(self, unit: FrameUnit, written: dict[str, Any]) -> ScanOutcome:
         """The outcome that a record has."""
-        figures = dict(written)
-        key, seconds, measured = (figures.pop(name) for name in ("key", "seconds", "measured"))
-        cleaned = CleanedScan(**figures)
+        first, key, seconds = unit.frames[0], written["key"], written["seconds"]
+        cleaned = CleanedScan(**written["cleaned"])
+        if isinstance(first, StoredBag):
+            frame: Frame = first.cloud(key, cleaned.scan, seconds)
+        else:
+            frame = unit.by_key[key]
         return ScanOutcome(
-            _frame(unit, key, cleaned.scan, seconds),
+            frame,
             [],
             cleaned,
             seconds,
-            measured,
+            written["measured"],
+            recording=written["recording"],
+            uploaded=written["uploaded"],
         )
 
-    def _measuring(self, unit: FrameUnit, here: FrameUnit) -> "UnitCleaning":
-        """The same where some clouds of a bag are measured, which are not known before now.
+    def _knowing_clouds(self, unit: FrameUnit, here: FrameUnit) -> "UnitCleaning":
+        """The same where the clouds of a bag are not known before now.
 
         Args:
             unit: The unit.
             here: The same with frames of this machine.
         """
-        if self.measured is None or not isinstance(unit.frames[0], StoredBag):
+        if not isinstance(unit.frames[0], StoredBag):
             return self
+        if self.measured is None:
+            return replace(self, finds_recordings=True)
         sample = evenly_spaced(here.frames, SAMPLED_SCANS)
         return replace(self, measured=frozenset(frame.key for frame in sample))
 
     def _cleaned(
         self, frame: Frame, judgement: Judgement, stopwatch: Stopwatch, sink: CleanSink
     ) -> ScanOutcome:
-        issues = _issues(self.method, judgement, self.most_removed)
-        share = judgement.share_of_rain
+        scan, share = judgement.scan, judgement.share_of_rain
+        issues = [*self.method.issues(judgement), *left_out(scan), *no_points(scan)]
         if share > self.most_removed:
             error = InputError(
                 frame.name,
@@ -143,12 +146,13 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
                 "--most-removed.",
             )
             return ScanOutcome(frame, issues, error=error)
+        issues += much_removed(share)
         with stopwatch.stage("weather"):
             due = self.measured is None or frame.key in self.measured
             measured = packed(judgement.weather) if due else None
         with stopwatch.stage("write"):
             sink.write(judgement)
-        valid, known = judgement.scan.valid, judgement.known
+        valid, known = scan.valid, judgement.known
         figures = CleanedScan(
             scan=frame.name,
             points=len(valid),
@@ -160,17 +164,3 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
             warnings=[issue.detail for issue in issues],
         )
         return ScanOutcome(frame, issues, figures, time_of(frame), measured)
-
-
-def _frame(unit: FrameUnit, key: str, name: str, seconds: float | None) -> Frame:
-    """The frame of a unit that has a key, or the cloud of its bag."""
-    first = unit.frames[0]
-    if isinstance(first, StoredBag):
-        return first.cloud(key, name, seconds)
-    return unit.by_key[key]
-
-
-def _issues(method: Method, judgement: Judgement, most_removed: float) -> list[ScanIssue]:
-    scan, share = judgement.scan, judgement.share_of_rain
-    odd = [*method.issues(judgement), *left_out(scan), *no_points(scan)]
-    return odd if share > most_removed else [*odd, *much_removed(share)]

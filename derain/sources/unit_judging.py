@@ -1,25 +1,27 @@
 """Judges the scans of one unit, and what a job has to know of it."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from abc import abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-import derain
 from derain.errors import InputError
 from derain.files.reading import reading
-from derain.jobs.running import Work
-from derain.sources.file_frame import FileFrame
+from derain.jobs.running import Result, Work
 from derain.sources.frame import Frame
-from derain.sources.judging import Answer, judgements
+from derain.sources.judgement import Judgement
+from derain.sources.judging import AnswerOrError, answers
 from derain.sources.method import Method
-from derain.sources.units import FrameUnit
+from derain.sources.units import FrameUnit, shared_options
+from derain.system.stopwatch import Stopwatch
+from derain.views.scan_issues import ScanIssue
 
-ResultT = TypeVar("ResultT")
+ResultT = TypeVar("ResultT", bound=Result)
 
-# A frame of a unit, and its answer, or why it has none.
-Judged = tuple[Frame, Answer | InputError]
+# Finds where the scans of whole recordings were taken: each frame with its pose, in order, and what
+# is odd about it.
+Placing = Callable[[Sequence[Frame]], Iterable[tuple[Frame, Sequence[ScanIssue]]]]
 
 
 @dataclass(frozen=True)
@@ -29,10 +31,12 @@ class UnitJudging(Work[FrameUnit, ResultT]):
     Attributes:
         method: What judges them.
         fingerprint: That of the method where the job began.
+        placing: Finds the poses of the scans; None leaves them as they are.
     """
 
     method: Method
     fingerprint: str
+    placing: Placing | None
 
     def check(self) -> None:
         """Refuses a method that is another one here, such as a model's file that has changed."""
@@ -43,7 +47,34 @@ class UnitJudging(Work[FrameUnit, ResultT]):
                 "Copy the file to every machine.",
             )
 
-    def judged(self, unit: FrameUnit) -> Iterator[Judged]:
+    @abstractmethod
+    def failure(self, frame: Frame, error: InputError) -> ResultT:
+        """The result of a scan that failed."""
+
+    def failed(self, unit: FrameUnit, error: InputError) -> ResultT:
+        """The result of a unit that failed as a whole, which is that of its first scan."""
+        return self.failure(unit.frames[0], error)
+
+    def results(
+        self, unit: FrameUnit, result: Callable[[Frame, Judgement, Stopwatch], ResultT]
+    ) -> Iterator[ResultT]:
+        """Judges the scans of a unit, and makes a result of each.
+
+        Args:
+            unit: The unit, whose frames have poses by now.
+            result: Makes it of a frame, its judgement, and the times of the stages.
+        """
+        for frame, answer, stopwatch in self.judged(unit):
+            try:
+                if isinstance(answer, InputError):
+                    raise answer
+                with reading(Path(frame.name)):  # which names the file where the memory is full
+                    made = result(frame, answer, stopwatch)
+            except InputError as error:
+                made = self.failure(frame, error)
+            yield made
+
+    def judged(self, unit: FrameUnit) -> Iterator[AnswerOrError]:
         """Judges the frames of a unit, and reads those around them that the method sees.
 
         Yields:
@@ -51,55 +82,26 @@ class UnitJudging(Work[FrameUnit, ResultT]):
         """
         frames = (*unit.before, *unit.frames, *unit.after)
         waiting = dict.fromkeys(unit.frames)  # those without answer, in order
-        caught: list[Judged] = []
-
-        @contextmanager
-        def catching(frame: Frame) -> Iterator[None]:
-            try:
-                with reading(Path(frame.name)):  # which names the file where the memory is full
-                    yield
-            except InputError as error:
-                caught.append((frame, error))
-
-        of_nobody: list[InputError] = []
-        for answer in judgements(self.method, frames, catching):
-            for frame, judged in (*self._failed(caught, frames, of_nobody), (answer[0], answer)):
-                if frame in waiting:
-                    del waiting[frame]
-                    yield frame, judged
-            if unit.after and not waiting:
-                break  # those after the unit need no answer
-        for frame, error in self._failed(caught, frames, of_nobody):
+        for frame, answer, stopwatch in answers(self.method, frames):
             if frame in waiting:
                 del waiting[frame]
-                yield frame, error
-        for frame in waiting:
+                yield frame, answer, stopwatch
+            if unit.after and not waiting:
+                break  # those after the unit need no answer
+        for frame in waiting:  # of a method whose errors do not name the scan
             none = InputError(frame.name, "has no answer", "See the errors of the scans around it.")
-            yield frame, of_nobody.pop(0) if of_nobody else none
+            yield frame, none, Stopwatch()
 
-    def _failed(
-        self, caught: list[Judged], frames: Sequence[Frame], of_nobody: list[InputError]
-    ) -> Iterator[Judged]:
-        """The frames that caught errors are about.
-
-        A method of several scans may fail at a scan that was pushed before; where an error does not
-        name one, such as that of a network, it is of one that gets no answer.
-
-        Args:
-            caught: Each error, with the frame that was pushed; emptied.
-            frames: All frames that were pushed.
-            of_nobody: Takes the errors that name no frame.
-        """
-        while caught:
-            pushed, error = caught.pop(0)
-            assert isinstance(error, InputError)
-            if not self.method.window.is_one_scan:
-                named = [frame for frame in frames if frame.name == str(error.subject)]
-                if not named:
-                    of_nobody.append(error)
-                    continue
-                pushed = named[0]
-            yield pushed, error
+    def placed(self, unit: FrameUnit) -> tuple[FrameUnit, Mapping[str, Sequence[ScanIssue]]]:
+        """The unit with poses, and what is odd about them, by the keys of the frames."""
+        if self.placing is None:
+            return unit, {}
+        issues = {}
+        frames = []
+        for frame, odd in self.placing(unit.frames):
+            frames.append(frame)
+            issues[frame.key] = odd
+        return replace(unit, frames=tuple(frames)), issues
 
     def options(self, command: str, source: Sequence[Frame], block: int) -> dict[str, Any]:
         """What the answers depend on but the scans, for the job of a command.
@@ -110,14 +112,11 @@ class UnitJudging(Work[FrameUnit, ResultT]):
             block: Scans of a block.
         """
         parameters = self.method.as_dict()
-        files = [frame for frame in source if isinstance(frame, FileFrame)]
+        found = {} if self.placing is None else {"poses": "found from the scans"}
         return {
-            "command": command,
-            "derain": derain.__version__,
+            **shared_options(command, source, block),
             **parameters,
             "method": Path(parameters["method"]).name,
             "content of the method": self.fingerprint,
-            "block": block,
-            "columns": sorted({",".join(frame.columns) for frame in files}),
-            "intensity_scale": sorted({frame.intensity_scale for frame in source}),
+            **found,
         }

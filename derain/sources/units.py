@@ -1,21 +1,26 @@
 """The units that a source splits into: recordings, bags, or blocks of scans of long recordings."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import sha256
-from typing import Self
+from pathlib import Path
+from typing import Any, Self
 
+import derain
 from derain.errors import InputError
 from derain.jobs.job import Job
 from derain.jobs.shard import Shard
 from derain.jobs.unit import Unit
 from derain.sources.bag_frame import BagFrame
+from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
 from derain.sources.method import Method
 from derain.sources.recordings import recordings_of
-from derain.sources.stored_frame import StoredBag
-from derain.stores.url import Place
+from derain.sources.stored_frame import StoredBag, StoredFrame
+from derain.stores.mirror import mirror
+from derain.stores.url import Place, is_url
 from derain.views.window import Window
 
 # Scans of a block: a few seconds of a drive, beside which the scans around a block that are read
@@ -56,6 +61,25 @@ class Division:
         asked = self.keep_records or self.anew or self.shard is not None
         return asked or len(source) > self.block or Job.is_begun(folder)
 
+    def begin(
+        self, folder: Place, options: Mapping[str, Any], units: "list[FrameUnit]"
+    ) -> "tuple[Job, list[FrameUnit]]":
+        """Begins a job, or goes on with the one of the folder.
+
+        Args:
+            folder: The folder of the results.
+            options: What the results depend on but the inputs.
+            units: All units.
+
+        Returns:
+            The job, and the units that are done now.
+
+        Raises:
+            InputError: The folder is of a job with other options, or cannot be written.
+        """
+        job = Job.begin(folder, options, units, self.shard, self.anew)
+        return job, job.shard_of(units, self.shard)
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FrameUnit(Unit):
@@ -76,18 +100,45 @@ class FrameUnit(Unit):
         """The frames that are judged, by their keys."""
         return {frame.key: frame for frame in self.frames}
 
-    def map(self, change: Callable[[Frame], Frame]) -> Self:
-        """The same of other frames, in the same order.
+    def of(self, change: Callable[[Sequence[Frame]], Sequence[Frame]]) -> Self:
+        """The same of other frames.
 
         Args:
-            change: Makes each from one that there is.
+            change: Makes the frames of each part, those that are judged and those around them.
         """
         parts = (self.frames, self.before, self.after)
-        frames, before, after = (tuple(map(change, part)) for part in parts)
+        frames, before, after = (tuple(change(part)) for part in parts)
         return replace(self, frames=frames, before=before, after=after)
 
+    @contextmanager
+    def fetched(self) -> Iterator[tuple[Self, Callable[[InputError], InputError]]]:
+        """Lends the unit with all files on this machine, while the block runs.
 
-def units_of(source: Sequence[Frame], method: Method, block: int = BLOCK) -> list[FrameUnit]:
+        Yields:
+            The unit, and what names URLs in errors in place of its files.
+
+        Raises:
+            InputError: A scan or a bag of a store cannot be fetched whole. Then nothing of the unit
+                is done, for what is found of one scan may depend on the others.
+        """
+        frames = (*self.before, *self.frames, *self.after)
+        stored = [frame for frame in frames if isinstance(frame, StoredFrame)]
+        if not stored:
+            yield self, lambda error: error
+            return
+        with mirror() as where:
+            where.fetch(each for frame in stored for each in frame.objects)
+
+            def here(frames: Sequence[Frame]) -> list[Frame]:
+                found: list[Frame] = []
+                for frame in frames:
+                    found += frame.fetched(where) if isinstance(frame, StoredFrame) else [frame]
+                return found
+
+            yield self.of(here), where.error_with_urls
+
+
+def units_of(source: Sequence[Frame], method: Method | None, block: int = BLOCK) -> list[FrameUnit]:
     """Splits a source so that the method judges each unit as it would judge the whole source.
 
     A bag is one unit, for it is written as a whole, and so is a recording of which every scan may
@@ -95,7 +146,7 @@ def units_of(source: Sequence[Frame], method: Method, block: int = BLOCK) -> lis
 
     Args:
         source: Frames in time order, one recording after the other.
-        method: What judges them.
+        method: What judges them; None where each scan is seen by itself.
         block: Scans of a block.
 
     Returns:
@@ -109,20 +160,49 @@ def whole(source: Sequence[Frame]) -> FrameUnit:
     return FrameUnit(id="", size=0, inputs="", frames=tuple(source))
 
 
+def shared_options(command: str, source: Sequence[Frame], block: int) -> dict[str, Any]:
+    """What the results of any command depend on but the content of the scans, for its job.
+
+    Args:
+        command: Name of the command.
+        source: The scans.
+        block: Scans of a block.
+    """
+    files = [frame for frame in source if isinstance(frame, FileFrame)]
+    return {
+        "command": command,
+        "derain": derain.__version__,
+        "block": block,
+        "columns": sorted({",".join(frame.columns) for frame in files}),
+        "intensity_scale": sorted({frame.intensity_scale for frame in source}),
+    }
+
+
+def folder_of_paths(source: Sequence[Frame], *places: Place) -> Path | None:
+    """The folder that relative paths begin in; None where there are none.
+
+    Args:
+        source: The scans.
+        places: Other paths and URLs.
+    """
+    files = [each for each in source if isinstance(each, FileFrame)]
+    paths = [each.path for each in files if not isinstance(each, StoredFrame)]
+    paths += [Path(place) for place in places if not is_url(place)]
+    return None if all(path.is_absolute() for path in paths) else Path.cwd()
+
+
 # Frames of a recording, where a unit of it begins and ends, and what the method sees around it.
 Span = tuple[Sequence[Frame], int, int, Window]
 
 
-def spans_of(source: Sequence[Frame], method: Method, block: int) -> list[Span]:
+def spans_of(source: Sequence[Frame], method: Method | None, block: int) -> list[Span]:
     """Where the units of a source begin and end; arguments as for :func:`units_of`."""
     return [span for each in recordings_of(source) for span in _spans_of(each, method, block)]
 
 
-def _spans_of(recording: Sequence[Frame], method: Method, block: int) -> Iterator[Span]:
-    window = (
-        None if isinstance(recording[0], BagFrame | StoredBag) else method.depends_on(recording)
-    )
-    if window is None:
+def _spans_of(recording: Sequence[Frame], method: Method | None, block: int) -> Iterator[Span]:
+    window = Window() if method is None else method.depends_on(recording)
+    if window is None or isinstance(recording[0], BagFrame | StoredBag):
         window, block = Window(), len(recording)
     for begin in range(0, len(recording), block):
         yield recording, begin, begin + block, window

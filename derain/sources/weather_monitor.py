@@ -1,6 +1,7 @@
 """The weather of a recording, scan by scan and of all scans together."""
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from derain.sources.frame import Frame
@@ -46,6 +47,7 @@ class WeatherMonitor:
     Args:
         options: How it is measured.
         source: The scans.
+        knows_recordings: Whether the source shows which scans follow one another.
 
     Attributes:
         total: The weather of all measured scans together.
@@ -55,23 +57,30 @@ class WeatherMonitor:
         sample: Keys of the scans to measure where not every scan is.
     """
 
-    def __init__(self, options: WeatherOptions, source: Source) -> None:
+    def __init__(
+        self, options: WeatherOptions, source: Source, knows_recordings: bool = True
+    ) -> None:
         self.total = ScanWeather.none()
         self.scans = 0
         self.scans_at = Counter[Level | None]()
         self._options = options
-        self._alarm, self._recording = options.new_alarm(), -1
-        self._recordings = _recording_numbers(source) if options.every_scan else {}
+        self._alarm = options.new_alarm()
+        self._recording: int | str = -1
+        known = options.every_scan and knows_recordings
+        self._recordings = recording_numbers(source) if known else {}
         sampled = 0 if options.every_scan or len(source) == 1 else SAMPLED_SCANS
         self.sample = frozenset(frame.key for frame in evenly_spaced(source, sampled))
         self._reaches: list[float] = []
 
-    def add(self, frame: Frame, weather: ScanWeather) -> WeatherRecord | None:
+    def add(
+        self, frame: Frame, weather: ScanWeather, recording: str | None = None
+    ) -> WeatherRecord | None:
         """Adds the weather of the next scan.
 
         Args:
             frame: The scan; a new recording starts with a new alarm.
             weather: Its weather.
+            recording: The recording that it is of; None leaves that to the source.
 
         Returns:
             Its figures; None unless every scan is measured.
@@ -83,7 +92,7 @@ class WeatherMonitor:
         if not self._options.every_scan:
             return None
         level = self._alarm.level_of(weather.visibility, weather.reach)
-        alarm = self._alarm_after(frame, weather)
+        alarm = self._alarm_after(recording or self._recordings.get(frame.key), weather)
         self.scans_at[level if alarm is None else alarm] += 1
         return WeatherRecord.of(weather, self._options.dry, level, alarm)
 
@@ -107,9 +116,8 @@ class WeatherMonitor:
         by = "rain alone" if dry is None else "rain and range"
         return f"{text} ({levels}, by {by})"
 
-    def _alarm_after(self, frame: Frame, weather: ScanWeather) -> Level | None:
+    def _alarm_after(self, recording: int | str | None, weather: ScanWeather) -> Level | None:
         """State of the alarm after a scan; None for a scan outside of any recording."""
-        recording = self._recordings.get(frame.key)
         if recording is None:
             return None
         if recording != self._recording:
@@ -117,7 +125,7 @@ class WeatherMonitor:
         return self._alarm.update(weather.visibility, weather.reach)
 
 
-def _recording_numbers(source: Source) -> dict[str, int]:
+def recording_numbers(source: Sequence[Frame]) -> dict[str, int]:
     """Number of the recording of each frame, by its key, without frames outside of recordings."""
     recordings = enumerate(unbroken_recordings(source))
     return {frame.key: number for number, recording in recordings for frame in recording}

@@ -2,7 +2,6 @@
 
 import json
 import os
-from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -16,47 +15,7 @@ from derain.stores.url import Place, is_url
 READ_AT_ONCE = 20 * AT_ONCE
 
 
-class Documents(ABC):
-    """Documents by their names, which are relative paths."""
-
-    @abstractmethod
-    def read(self, name: str) -> bytes | None:
-        """The content of a document; None where it is not there.
-
-        Raises:
-            InputError: The store cannot be reached.
-        """
-
-    @abstractmethod
-    def read_each(self, names: Sequence[str]) -> Iterator[bytes | None]:
-        """The contents of many, one after the other; see :meth:`read`."""
-
-    @abstractmethod
-    def write(self, name: str, text: str) -> None:
-        """Writes a document whole, over one that is there.
-
-        Raises:
-            InputError: It cannot be written.
-        """
-
-    @abstractmethod
-    def create(self, name: str, text: str) -> None:
-        """Writes a document unless it is there; which one is there, only reading it shows.
-
-        Raises:
-            InputError: It cannot be written.
-        """
-
-    @abstractmethod
-    def remove_all(self) -> None:
-        """Removes all documents.
-
-        Raises:
-            InputError: The store cannot be reached.
-        """
-
-
-def documents_at(folder: Place, name: str) -> Documents:
+def documents_at(folder: Place, name: str) -> "Documents":
     """The documents in a folder of a place.
 
     Args:
@@ -68,8 +27,10 @@ def documents_at(folder: Place, name: str) -> Documents:
     return FileDocuments(Path(folder, name))
 
 
-class FileDocuments(Documents):
+class FileDocuments:
     """Documents in a folder of this machine, or of a file system that several share.
+
+    Documents have relative paths for names.
 
     Args:
         folder: The folder, made when the first is written.
@@ -89,12 +50,20 @@ class FileDocuments(Documents):
         yield from map(self.read, names)
 
     def write(self, name: str, text: str) -> None:
-        """Writes a document whole."""
+        """Writes a document whole, over one that is there.
+
+        Raises:
+            InputError: It cannot be written.
+        """
         with replacing(self._folder / name) as temporary:
             temporary.write_text(text, "utf-8")
 
     def create(self, name: str, text: str) -> None:
-        """Writes a document unless it is there."""
+        """Writes a document unless it is there; which one is there, only reading it shows.
+
+        Raises:
+            InputError: It cannot be written.
+        """
         path = self._folder / name
         if path.exists():
             return
@@ -116,8 +85,10 @@ class FileDocuments(Documents):
             os.replace(self._folder, temporary / self._folder.name)
 
 
-class ObjectDocuments(Documents):
-    """Documents in a folder of an object store.
+class ObjectDocuments:
+    """Documents in a folder of an object store, by the same names and methods.
+
+    Each method raises an InputError where the store cannot be reached.
 
     Args:
         url: URL of the folder.
@@ -176,3 +147,7 @@ class ObjectDocuments(Documents):
                 filesystem.rm(folder, recursive=True)
 
         tried(self._url, remove)
+
+
+# Documents of a folder, wherever it is.
+Documents = FileDocuments | ObjectDocuments

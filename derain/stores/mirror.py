@@ -92,12 +92,13 @@ def mirror() -> Iterator[Mirror]:
 
 
 @contextmanager
-def uploaded(place: Place) -> Iterator[Path]:
+def uploaded(place: Place, stamps: dict[str, str]) -> Iterator[Path]:
     """Lends the folder of a place to be written to.
 
     Args:
         place: A folder, which is lent itself; or a URL, for which a temporary folder is lent, whose
             files are uploaded when the block ends well.
+        stamps: Takes the sizes and versions of what is uploaded, by path.
 
     Raises:
         InputError: The folder for temporary files cannot be written, or the store.
@@ -109,4 +110,4 @@ def uploaded(place: Place) -> Iterator[Path]:
         with writing(Path(gettempdir())):
             folder = stack.enter_context(temporary_folder(Path(gettempdir())))
         yield folder
-        upload(folder, str(place))
+        stamps |= upload(folder, str(place))

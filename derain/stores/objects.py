@@ -70,6 +70,11 @@ class StoredObject:
         """The path that stands for its URL."""
         return path_of(self.url)
 
+    @property
+    def stamp(self) -> str:
+        """Its size and version: what changes when its content does."""
+        return f"{self.size}-{self.version}"
+
 
 def listed(url: str) -> list[StoredObject]:
     """The object at a URL, or the objects below it.
@@ -81,11 +86,19 @@ def listed(url: str) -> list[StoredObject]:
     Raises:
         InputError: There is none, or the store cannot be reached.
     """
-    filesystem, path = _opened(url)
-    entries = tried(url, lambda: _entries(filesystem, url, path))
-    if not entries:
+    found = _found(url)
+    if not found:
         raise _missing(url)
-    return [_object(filesystem, entry) for entry in entries]
+    return found
+
+
+def stamps_at(url: str) -> dict[str, str]:
+    """Sizes and versions of the objects below a URL, by path, in one listing.
+
+    Raises:
+        InputError: The store cannot be reached.
+    """
+    return {str(each.path): each.stamp for each in _found(url)}
 
 
 def fetch(objects: Mapping[Path, StoredObject]) -> None:
@@ -104,27 +117,30 @@ def fetch(objects: Mapping[Path, StoredObject]) -> None:
             pass
 
 
-def upload(folder: Path, url: str) -> None:
+def upload(folder: Path, url: str) -> dict[str, str]:
     """Writes the files of a folder to a store, several at once; each appears when it is complete.
 
     Args:
         folder: The folder.
         url: URL of the folder in the store.
 
+    Returns:
+        Sizes and versions of the objects, by path.
+
     Raises:
         InputError: One of them cannot be written.
     """
     filesystem, path = _opened(url)
 
-    def put(file: Path) -> None:
+    def put(file: Path) -> StoredObject:
         relative = file.relative_to(folder).as_posix()
         key = f"{path.rstrip('/')}/{relative}"
         tried(f"{url}/{relative}", lambda: filesystem.put_file(str(file), key))
+        return _object(filesystem, tried(f"{url}/{relative}", lambda: filesystem.info(key)))
 
     files = [file for file in folder.rglob("*") if file.is_file()]
     with ThreadPoolExecutor(AT_ONCE) as pool:
-        for _ in pool.map(put, files):
-            pass
+        return {str(stored.path): stored.stamp for stored in pool.map(put, files)}
 
 
 def tried(url: str, request: Callable[[], Result]) -> Result:
@@ -176,6 +192,13 @@ def _opened(url: str) -> tuple[Any, str]:
             "Give a URL such as s3://bucket/folder.",
         ) from None
     return filesystem, path
+
+
+def _found(url: str) -> list[StoredObject]:
+    """The object at a URL, or those below it; none where nothing is there."""
+    filesystem, path = _opened(url)
+    entries = tried(url, lambda: _entries(filesystem, url, path))
+    return [_object(filesystem, entry) for entry in entries]
 
 
 def _entries(filesystem: Any, url: str, path: str) -> list[dict[str, Any]]:

@@ -12,6 +12,7 @@ from derain.sources.judging import Guard, unguarded
 from derain.sources.method import Method
 from derain.sources.recordings import irregularities
 from derain.sources.source import Source
+from derain.sources.unit_judging import Placing
 from derain.sources.units import Division
 from derain.system.notices import Notices, warn
 
@@ -48,6 +49,7 @@ def teach_recordings(
     watch: Watch = lambda scan: None,
     division: Division | None = None,
     executor: Submits | None = None,
+    placing: Placing | None = None,
 ) -> TeachResults:
     """Labels recordings by a method, and warns where a network could learn little from the labels.
 
@@ -60,6 +62,7 @@ def teach_recordings(
         watch: Receives each scan.
         division: How the scans are divided into units; see :func:`derain.annotation.teach.teach`.
         executor: Does the units; None does them in this process.
+        placing: Finds where the scans were taken; see :func:`derain.annotation.teach.teach`.
 
     Raises:
         InputError: As for :func:`derain.annotation.teach.teach`.
@@ -78,7 +81,7 @@ def teach_recordings(
             record.add_cells(scan.truth)
         watch(scan)
 
-    manifest = teach(method, source, out, card, guard, count, division, executor)
+    manifest = teach(method, source, out, card, guard, count, division, executor, placing)
     notices.warn_of_repeats()
     results = TeachResults(manifest, judged, counts, record)
     if division is None or division.shard is None:

@@ -1,9 +1,10 @@
 """Runs a bench: every method on the same scans, each timed alone."""
 
 import platform
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache, partial
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -26,23 +27,20 @@ from derain.export.timing import processor, versions
 from derain.files import DEFAULT_COLUMNS
 from derain.filters import PointFilter
 from derain.filters.point_filter import filter_view, rain_among, rows_of
-from derain.jobs.workers import each_by
+from derain.jobs.running import Submits, Task, ValueWork, values
 from derain.scan import Scan
 from derain.sources.folders import GivenScans, source_of
-from derain.sources.frame import Frame
+from derain.sources.reader import FrameReader
 from derain.sources.spread import evenly_spaced
 from derain.sources.training_record import training_overlap
-from derain.sources.units import BLOCK
+from derain.sources.units import Division, FrameUnit, folder_of_paths, shared_options, units_of
 from derain.spec import Spec
-from derain.system.cores import threads_of
+from derain.stores.url import Place
 from derain.system.extras import MATPLOTLIB, MissingExtraError, require
-from derain.system.notices import Notice, Notices, warn
+from derain.system.notices import Notices, warn
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
-
-# Name of a scan, what is odd about it, and the title of the method to which that matters.
-IssuesOfScan = tuple[str, Iterable[Notice], str]
-WarnOf = Callable[[str, Iterable[Notice], str], None]
+from derain.views.scan_issues import ScanIssue
 
 
 @dataclass(frozen=True)
@@ -182,12 +180,47 @@ def bench(
     return run_bench(rows, labelled(scans), effort, command=f"derain.bench([{titles}], ...)")
 
 
+def count_in_units(
+    methods: Sequence[BenchEntry],
+    data: LabelledFrames,
+    threads: int,
+    folder: Place | None = None,
+    division: Division = Division(),
+    executor: Submits | None = None,
+) -> list[dict[str, Any]] | None:
+    """Counts the answers of every method to every scan, unit by unit.
+
+    Args:
+        methods: The methods, one or more.
+        data: The scans.
+        threads: Threads of views and networks of a process; 0 takes every core it may use.
+        folder: Where records are kept, if the division keeps them; None keeps none.
+        division: How the scans are divided into units.
+        executor: Does the units; None does them in this process.
+
+    Returns:
+        The counts of each unit, for :func:`run_bench`; None while other shards are to be done.
+
+    Raises:
+        InputError: A scan that cannot be read; records of other options in the folder.
+    """
+    work = Counting(methods, threads, data.reader, data.distinct, data.rain_rates)
+    if folder is None or not division.keeps_records(data.frames, folder):
+        # In this process they are of one scan, so that a progress bar counts scans.
+        units = units_of(data.frames, None, 1 if executor is None else division.block)
+        return values(Task(None, work), units, units, executor, "scoring")
+    units = units_of(data.frames, None, division.block)
+    job, shard = division.begin(folder, _options(methods, data, division.block), units)
+    task = Task(job, work, folder_of_paths(data.frames, folder))
+    return values(task, units, shard, executor, "scoring")
+
+
 def run_bench(
     methods: Sequence[BenchEntry],
     data: LabelledFrames,
     effort: Effort,
     command: str,
-    workers: int = 1,
+    counted: Sequence[Mapping[str, Any]] | None = None,
 ) -> Bench:
     """Scores every method on every scan, and measures what each costs alone.
 
@@ -196,22 +229,26 @@ def run_bench(
         data: The scans.
         effort: How much is timed, and the seed.
         command: The command or call of this bench, for its report.
-        workers: Processes that score; each method is timed alone.
+        counted: What :func:`count_in_units` returned; None counts now, in this process.
 
     Raises:
         InputError: A scan that cannot be read. The row of a method that fails states so.
     """
+    if counted is None:
+        counted = count_in_units(methods, data, effort.threads)
+    assert counted is not None  # there is one shard
     notices = Notices()
     notes = [note for method in methods if (note := _overlap(method, data))]
     for note in notes:
         warn(note)
     timed_on = evenly_spaced(data.frames, effort.timed)
     timing = Timing(timed_on, effort.threads, effort.repeats, data.intensity_scale)
-    if workers == 1:
-        shown = tqdm(data.frames, desc="scoring", unit="scan", disable=None)
-        scored = _scored(methods, data, effort.threads, shown, notices.warn)
-    else:
-        scored = _scored_by(workers, methods, data, effort.threads, notices.warn)
+    scored = [Scoring(data.card) for _ in methods]
+    for of_unit in counted:
+        for scoring, counts in zip(scored, of_unit["counts"], strict=True):
+            scoring.add(counts)
+        for scan, method, kind, detail in of_unit["issues"]:
+            notices.warn(scan, [ScanIssue(kind, detail)], method)
     scores = [scoring.scores() for scoring in scored]
     rained = any(one.pooled.true_positive + one.pooled.false_negative for one in scores)
     warn_without_rain(rained, data.card)
@@ -221,7 +258,8 @@ def run_bench(
     ]
     notices.warn_of_repeats()
     rows = bench_rows(methods, scores, costs, np.random.default_rng(effort.seed))
-    facts = _facts(command, data, timing, effort.seed, methods)
+    files = [file for of_unit in counted for file in of_unit["files"]]
+    facts = _facts(command, data, timing, effort.seed, methods, files)
     changed = [_changed(method, timing, data) for method in methods if method.usual is not None]
     return Bench(rows, {**facts, "notes": notes, "runtimes": changed})
 
@@ -262,67 +300,75 @@ def _overlap(method: BenchEntry, data: LabelledFrames) -> str | None:
     return training_overlap(method.title, spec, data.card, data.frames)
 
 
-def _scored(
-    methods: Sequence[BenchEntry],
-    data: LabelledFrames,
-    threads: int,
-    frames: Iterable[Frame],
-    warn_of: WarnOf,
-) -> list[Scoring]:
-    """Scores every method on the scans.
+@dataclass(frozen=True)
+class Counting(ValueWork[FrameUnit]):
+    """Counts the answers of methods to the scans of units.
 
-    Args:
+    Attributes:
         methods: The methods.
-        data: The scans.
         threads: Threads of views and networks.
-        frames: The same scans, perhaps with a progress bar.
-        warn_of: Receives where a scan does not suit a method.
+        reader: Reads the scans.
+        distinct: Whether points at one position count once.
+        rain_rates: Rain rate in mm/h by sequence, where it is known.
     """
 
-    def scans() -> Iterator[Scan]:
-        for frame in frames:
-            scan = data.read(frame)
-            for method in methods:
-                if method.spec_or_filter is not None:
-                    warn_of(frame.name, method.spec_or_filter.issues(scan), method.title)
-            yield scan
+    methods: Sequence[BenchEntry]
+    threads: int
+    reader: FrameReader
+    distinct: bool
+    rain_rates: Mapping[str, float]
 
-    rain_rates = list(map(data.rain_rate, data.frames))
-    ready = scored_methods(methods, threads)
-    return scorings(ready, scans(), data.card, data.distinct, rain_rates)
+    def value(self, unit: FrameUnit) -> dict[str, Any]:
+        """The counts of each method, where scans do not suit one, and the checksums of the files.
+
+        Raises:
+            InputError: A scan that cannot be read.
+        """
+        issues: list[tuple[str, str, str, str]] = []
+
+        def scans() -> Iterator[Scan]:
+            for frame in unit.frames:
+                scan = self.reader.read(frame)
+                issues.extend(self._issues(frame.name, scan))
+                yield scan
+
+        rates = [self.rain_rates.get(frame.sequence) for frame in unit.frames]
+        scored = scorings(self._ready, scans(), self.reader.card, self.distinct, rates)
+        files = []
+        for frame in unit.frames:
+            of_scan, of_label = frame.checksums()
+            files.append({"scan": frame.name, "sha256": of_scan, "label_sha256": of_label})
+        counts = [scoring.to_json() for scoring in scored]
+        return {"counts": counts, "issues": issues, "files": files}
+
+    def _issues(self, name: str, scan: Scan) -> Iterator[tuple[str, str, str, str]]:
+        """Name of a scan, title of a method that it does not suit, and kind and detail of why."""
+        for method in self.methods:
+            if method.spec_or_filter is not None:
+                for issue in method.spec_or_filter.issues(scan):
+                    yield name, method.title, issue.kind, issue.detail
+
+    @cached_property
+    def _ready(self) -> list[ScoredMethod]:
+        """The methods, which one process makes once."""
+        return scored_methods(self.methods, self.threads)
 
 
-def _scored_by(
-    workers: int,
-    methods: Sequence[BenchEntry],
-    data: LabelledFrames,
-    threads: int,
-    warn_of: WarnOf,
-) -> list[Scoring]:
-    """The same by several processes, which share the threads."""
-    starts = range(0, len(data.frames), BLOCK)
-    blocks = [replace(data, frames=data.frames[start : start + BLOCK]) for start in starts]
-    threads_of_each = max(threads_of(threads) // workers, 1)
-    parts = each_by(workers, partial(_scored_block, methods, threads_of_each), blocks)
-    totals = [Scoring(data.card) for _ in methods]
-    for scored, found in tqdm(parts, "scoring", len(blocks), unit="block", disable=None):
-        for total, part in zip(totals, scored, strict=True):
-            total.add(part)
-        for issues in found:
-            warn_of(*issues)
-    return totals
+def _options(methods: Sequence[BenchEntry], data: LabelledFrames, block: int) -> dict[str, Any]:
+    """What the counts depend on but the scans."""
+    return {
+        **shared_options("bench", data.frames, block),
+        **{f"method {method.title}": method.fingerprint for method in methods},
+        "card": data.card.name,
+        "content of the card": _fingerprint(data.card),
+        "intensity_scale": data.intensity_scale,
+        "distinct": data.distinct,
+        "rain rates": _fingerprint(sorted(data.rain_rates.items())),
+    }
 
 
-def _scored_block(
-    methods: Sequence[BenchEntry], threads: int, data: LabelledFrames
-) -> tuple[list[Scoring], list[IssuesOfScan]]:
-    """Scores a block of scans, in a process of its own, and finds where they suit no method."""
-    found: list[IssuesOfScan] = []
-
-    def note(scan: str, issues: Iterable[Notice], method: str) -> None:
-        found.append((scan, list(issues), method))
-
-    return _scored(methods, data, threads, data.frames, note), found
+def _fingerprint(content: object) -> str:
+    return sha256(repr(content).encode()).hexdigest()[:16]
 
 
 def _changed(method: BenchEntry, timing: Timing, data: LabelledFrames) -> dict[str, Any]:
@@ -341,7 +387,7 @@ def _changed(method: BenchEntry, timing: Timing, data: LabelledFrames) -> dict[s
         assert isinstance(usual, Derainer)
         assert isinstance(other, Derainer)
         # Nothing holds on to a scan while the next one is read.
-        scans = ((frame.name, data.read(frame)) for frame in timing.frames)
+        scans = ((frame.name, data.reader.read(frame)) for frame in timing.frames)
         proof = compare_runtimes(usual, other, scans)
     except Exception as error:  # its row states whatever a runtime raises
         return {**changed, "failure": reason_of(error)}
@@ -351,16 +397,17 @@ def _changed(method: BenchEntry, timing: Timing, data: LabelledFrames) -> dict[s
 
 
 def _facts(
-    command: str, data: LabelledFrames, timing: Timing, seed: int, methods: Sequence[BenchEntry]
+    command: str,
+    data: LabelledFrames,
+    timing: Timing,
+    seed: int,
+    methods: Sequence[BenchEntry],
+    files: Sequence[Mapping[str, Any]],
 ) -> dict[str, Any]:
     """Everything that a bench depends on besides its methods, as JSON-able primitives."""
     card, frames = data.card, data.frames
     others = [method.runtime.name for method in methods if method.usual]
     scans = "1 scan" if len(frames) == 1 else f"{len(frames):,} scans"
-    files = []
-    for frame in frames:
-        of_scan, of_label = frame.checksums()
-        files.append({"scan": frame.name, "sha256": of_scan, "label_sha256": of_label})
     return {
         "title": f"{card.title}, {scans}",
         "command": command,

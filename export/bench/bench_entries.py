@@ -3,6 +3,7 @@
 Nothing here loads torch, so that a process that measures a method's memory holds little else.
 """
 
+import json
 import pickle
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -72,6 +73,7 @@ class BenchEntry:
         spec_or_filter: Checks whether a scan suits the method: a model's Spec or a filter.
         runtime: The runtime of a model.
         usual: Makes the same model in onnxruntime in float32, where it has another runtime.
+        learnt: Fingerprint of what a baseline has learnt, where its facts do not hold it.
     """
 
     title: str
@@ -83,6 +85,14 @@ class BenchEntry:
     spec_or_filter: ScanChecker | None = None
     runtime: Runtime = field(default_factory=Runtime)
     usual: Callable[[int], TimedMethod] | None = None
+    learnt: str = ""
+
+    @property
+    def fingerprint(self) -> str:
+        """A fingerprint of what it calls rain, 16 hexadecimal digits, wherever its file lies."""
+        facts = {name: fact for name, fact in self.facts.items() if name != "model"}
+        content = json.dumps([self.kind, facts, self.learnt], sort_keys=True)
+        return sha256(content.encode()).hexdigest()[:16]
 
     @cached_property
     def is_picklable(self) -> bool:
@@ -254,7 +264,8 @@ def _learnt(title: str, name: str, learn_from: LearnFrom | None) -> BenchEntry:
         )
     if name == "position":
         prior = PositionPrior.learn(learn_from())
-        return BenchEntry(title, name, TimedFunction(prior).ready, {"voxel": VOXEL})
+        learnt = sha256(prior.rain.tobytes()).hexdigest()
+        return BenchEntry(title, name, TimedFunction(prior).ready, {"voxel": VOXEL}, learnt=learnt)
     rule = IntensityRule.best(learn_from())
     limits = f"intensity <= {rule.intensity:.4g} and range <= {rule.range:.4g} m"
     return BenchEntry(title, name, TimedFunction(rule).ready, {"rule": limits}, spec_or_filter=rule)

@@ -44,28 +44,17 @@ class LabelledFrames:
         for frame in self.frames:
             frame.require_labels()
 
-    def read(self, frame: Frame) -> Scan:
-        """Reads a scan with its labels.
-
-        Raises:
-            InputError: A file that cannot be read, or labels that are not on the data card.
-        """
-        return self._reader.read(frame)
-
-    def rain_rate(self, frame: Frame) -> float | None:
-        """Rain rate of a scan in mm/h; None where it is not known."""
-        return self.rain_rates.get(frame.sequence)
-
     def truths(self) -> Iterator[tuple[Scan, NDArray[np.bool_]]]:
         """Reads some of the scans, spread evenly: points of known class, and which are rain.
 
         Raises:
             InputError: A file that cannot be read, or labels that are not on the data card.
         """
-        read = self._reader.read_distinct if self.distinct else self._reader.read
+        read = self.reader.read_distinct if self.distinct else self.reader.read
         for frame in evenly_spaced(self.frames, MOST_TRAINING_SCANS):
             yield self.card.known_points(read(frame))
 
     @property
-    def _reader(self) -> FrameReader:
+    def reader(self) -> FrameReader:
+        """Reads them with their labels."""
         return FrameReader(self.card, self.intensity_scale)

@@ -73,28 +73,50 @@ def test_every_method_and_baseline_stands_in_one_table(
     assert all(f"| {name} " in outcome.out for name in rows)
 
 
-def test_processes_score_what_one_does_and_warn_of_the_same(
-    run_derain, root: Path, tmp_path: Path, onnx_model: Path, monkeypatch: pytest.MonkeyPatch
+def test_units_are_scored_as_one_process_scores_and_warned_of_alike(
+    run_derain, succeed, root: Path, tmp_path: Path, onnx_model: Path
 ) -> None:
-    monkeypatch.setattr(bench, "BLOCK", 2)  # of the three scans
     for path in root.rglob("*.bin"):
         points = np.fromfile(path, np.float32).reshape(-1, 4)
         (points / np.array([1, 1, 1, 256], np.float32)).tofile(path)
     methods = ["--methods", onnx_model, "ssr", "dror", "position", "all"]
     arguments = ["bench", "--data", root, *methods, *ONCE, "--threads", 2, "--out"]
     one = run_derain(*arguments, tmp_path / "one")
-    two = run_derain(*arguments, tmp_path / "two", "--workers", 2)
+    two = run_derain(*arguments, tmp_path / "two", "--workers", 2, "--block", 2)
     assert one.said == two.said != []
-    assert scores(tmp_path / "two") == scores(tmp_path / "one")
+    first = run_derain(*arguments, tmp_path / "shards", "--block", 2, "--shard", "0/2")
+    assert (first.code, "derain status" in first.out, first.said) == (0, True, [])
+    status = run_derain("status", tmp_path / "shards")
+    assert (status.code, "2 of 3 units done" in status.out) == (2, True)
+    last = run_derain(*arguments, tmp_path / "shards", "--block", 2, "--shard", "1/2")
+    assert one.said == last.said
+    assert "3 of 3 units done" in succeed("status", tmp_path / "shards").out
+    assert report(tmp_path / "two") == report(tmp_path / "one") == report(tmp_path / "shards")
 
 
-def scores(folder: Path) -> list[dict[str, Any]]:
-    """The rows of a bench without times and memory."""
+def report(folder: Path) -> dict[str, Any]:
+    """What a bench found and measured, without the name of its folder, times and memory."""
+    found = read_report(folder)
+    found["command"] = found["command"].replace(str(folder), "")
     costs = ("ms", "stages", "peak_memory")
-    return [
-        {name: value for name, value in row.items() if not name.startswith(costs)}
-        for row in read_report(folder)["rows"]
-    ]
+    for row in found["rows"]:
+        for name in [name for name in row if name.startswith(costs)]:
+            del row[name]
+    return found
+
+
+def test_a_bench_that_goes_on_scores_no_unit_again_and_refuses_other_methods(
+    succeed, refused, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arguments = ["bench", "--data", root, *ONCE, "--resume", "--out", tmp_path, "--methods"]
+    succeed(*arguments, "dror", "position")
+    assert "method ror" in refused(*arguments, "ror", "position")
+    label = root / "sequences/000/lidar_radar_labels/0.label"
+    write_labels(label, np.zeros(300, np.int64))  # from which position learns
+    assert "method position" in refused(*arguments, "dror", "position")
+    with monkeypatch.context() as nothing:
+        nothing.delattr(bench, "scorings")
+        succeed(*arguments, "dror", "position", "--train", root / "sequences/001/lidar_radar_pcd")
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from derain.cards.card import load_card
+from derain.evaluation.contents import count_frame
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
 from derain.simulation.manifest import MAKER
@@ -37,7 +38,6 @@ def some(by_class: dict[str, float]) -> dict[str, float]:
 
 def test_a_data_set_is_one_object_for_programs(facts_of, data_set: Path) -> None:
     facts = facts_of(data_set)
-    assert facts_of(data_set, "--workers", 2) == facts
     assert facts["folder"] == str(data_set)
     assert facts["layout"] == ["lidar_radar_pcd", "lidar_radar_labels"]
     assert facts["card"] == "simulated rain"
@@ -62,6 +62,54 @@ def test_the_table_has_a_line_a_class_and_a_column_a_rate(run_derain, data_set: 
         ["rain", "40", "6.667%", "0", "20", "20"],
         ["road", "560", "93.333%", "200", "180", "180"],
     ]
+
+
+def test_units_are_counted_as_one_process_counts_and_not_again(
+    run_derain, succeed, data_set: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    table = succeed("info", data_set).out
+    assert succeed("info", data_set, "--workers", 2).out == table
+    first, last = (
+        ("info", data_set, "--out", tmp_path / "counts", "--shard", f"{number}/2")
+        for number in (0, 1)
+    )
+    assert "derain status" in succeed(*first).out
+    status = run_derain("status", tmp_path / "counts")
+    assert (status.code, "2 of 3 units done" in status.out) == (2, True)
+    assert succeed(*last).out == table
+    label = data_set / "sequences/001/lidar_radar_labels/000000.label"
+    write_labels(label, np.full(100, 7))  # other inputs, the same counts
+    with monkeypatch.context() as counted:
+        seen: list[str] = []
+        counted.setattr(
+            "derain.evaluation.contents.count_frame",
+            lambda frame: seen.append(frame.key) or count_frame(frame),
+        )
+        assert succeed("info", data_set, "--out", tmp_path / "counts").out == table
+    assert seen == ["001/000000", "001/000001"]
+
+
+def test_a_unit_that_cannot_be_counted_does_not_stop_the_others_of_a_folder_of_records(
+    run_derain, succeed, data_set: Path, tmp_path: Path
+) -> None:
+    scan = data_set / "sequences/000/lidar_radar_pcd/000001.bin"
+    content = scan.read_bytes()
+    scan.write_bytes(b"broken")
+    command = ("info", data_set, "--out", tmp_path / "counts")
+    outcome = run_derain(*command)
+    assert (outcome.code, outcome.out) == (2, "")
+    assert "1 of 3 units failed" in outcome.err.splitlines()[-1]
+    assert "2 of 3 units done, 1 failed" in run_derain("status", tmp_path / "counts").out
+    scan.write_bytes(content)
+    assert succeed(*command).out == succeed("info", data_set).out
+
+
+def test_records_are_of_one_folder_and_are_asked_for(
+    refused, data_set: Path, tmp_path: Path
+) -> None:
+    assert "--out" in refused("info", data_set, data_set, "--out", tmp_path / "counts")
+    assert "--out" in refused("info", data_set, "--shard", "0/2")
+    assert "--out" in refused("info", data_set, "--anew")
 
 
 def test_a_card_without_labels_to_explain_is_warned_of(run_derain, tmp_path: Path) -> None:

@@ -95,19 +95,51 @@ def test_processes_in_another_folder_do_what_is_in_a_store(
     assert len(in_store(s3, "out")) == 2 * SCANS
 
 
-@pytest.mark.parametrize("storage", ["mcap", "ros1"])
+@pytest.mark.parametrize(("storage", "poses"), [("mcap", "poses.txt"), ("ros1", "odometry")])
 def test_a_bag_of_a_store_is_cleaned_as_one_of_a_folder(
-    succeed, s3: Any, tmp_path: Path, storage: str
+    succeed, s3: Any, drive: Path, tmp_path: Path, storage: str, poses: str
 ) -> None:
     (tmp_path / "bags").mkdir()
     small_bag(tmp_path / "bags", storage)
     s3.put(f"{tmp_path / 'bags'}/", f"{BUCKET}/bags/", recursive=True)
-    succeed("run", "dror", tmp_path / "bags", "--out", tmp_path / "out", *OPTIONS)
-    command = ("run", "dror", "s3://drives/bags", "--out", "s3://drives/out", *OPTIONS)
-    first, again = succeed(*command), succeed(*command)
+    trajectory = drive / "poses.txt"
+    trajectory.write_text("\n".join(trajectory.read_text().splitlines()[:3]))
+    options = (*OPTIONS, "--poses", trajectory if poses == "poses.txt" else poses)
+    local, table = tmp_path / "local.csv", tmp_path / "stored.csv"
+    bag = tmp_path / "bags"
+    succeed("run", "persistence", bag, "--out", tmp_path / "out", *options, "--weather", local)
+    command = ("run", "persistence", "s3://drives/bags", "--out", "s3://drives/out", *options)
+    first = succeed(*command, "--weather", table)
+    assert rows_without_names(table) == rows_without_names(local)
+    again = succeed(*command, "--weather", table)
+    assert rows_without_names(table) == rows_without_names(local)
     assert in_store(s3, "out") == in_folder(tmp_path / "out")
     assert "s3://drives/bags/drive" in first.out.splitlines()[0]
     assert "3 scans (3 of them done before)" in again.out
+    if poses == "poses.txt":
+        trajectory.write_text(trajectory.read_text().replace("0.3", "0.4"))
+        assert "done before" not in succeed(*command, "--weather", table).out
+
+
+def rows_without_names(table: Path) -> list[list[str]]:
+    """The rows of a table of the weather, alarms among them, without the names of the scans."""
+    rows = [line.split(",")[1:] for line in table.read_text().splitlines()]
+    assert len(rows) == 4
+    return rows
+
+
+def test_results_that_were_removed_or_replaced_are_written_again(
+    succeed, s3: Any, drive: Path
+) -> None:
+    s3.put(f"{drive}/", f"{BUCKET}/drive/", recursive=True)
+    command = ("run", "dror", "s3://drives/drive/", "--out", "s3://drives/out", *OPTIONS)
+    succeed(*command)
+    results = in_store(s3, "out")
+    s3.rm(f"{BUCKET}/out/000001.label")
+    s3.pipe(f"{BUCKET}/out/000004.bin", bytes(len(results["000004.bin"])))
+    again = succeed(*command)
+    assert f"{SCANS} scans ({SCANS - 3} of them done before)" in again.out
+    assert in_store(s3, "out") == results
 
 
 def test_what_cannot_be_read_is_listed_and_done_by_the_next_run(

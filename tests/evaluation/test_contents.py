@@ -45,7 +45,7 @@ def test_sequences_are_found_from_the_root_to_the_sequence(
     sequences = find_sequences(folder, layout)
     expected = ["000"] if "000" in root else ["000", "001"]
     assert [sequence.name for sequence in sequences] == expected
-    assert [frame.key for frame in sequences[0].frames] == ["000000", "000001"]
+    assert [frame.key for frame in sequences[0].frames] == ["000/000000", "000/000001"]
     assert sequences[0].rain_rate is None
 
 

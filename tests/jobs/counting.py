@@ -1,57 +1,47 @@
 """Work that tests can follow: each unit writes a file, and some fail, or kill their process."""
 
 import os
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from derain.errors import InputError
-from derain.jobs.running import Work
+from derain.jobs.running import IsThere, Value, ValueWork
 from derain.jobs.unit import Unit
 
 
 @dataclass(frozen=True)
-class Counting(Work[Unit, str]):
+class Counting(ValueWork[Unit]):
     """Writes ``<id>.txt`` for each unit, and a line to ``<id>.tries`` for each time it is done.
 
     Attributes:
         folder: Where to.
         failing: Ids of units that cannot be done.
         killing: Ids of units that kill their process.
+        killing_once: Ids of those that kill it the first time.
         unfit: Whether no process can do the work.
     """
 
     folder: Path
     failing: tuple[str, ...] = ()
     killing: tuple[str, ...] = ()
+    killing_once: tuple[str, ...] = ()
     unfit: bool = False
 
     def check(self) -> None:
         if self.unfit:
             raise InputError("model.onnx", "there is no such file", "Copy it.")
 
-    def do(self, unit: Unit) -> Iterator[str]:
-        with (self.folder / f"{unit.id}.tries").open("a") as tries:
-            tries.write("tried\n")
-        if unit.id in self.killing:
+    def value(self, unit: Unit) -> str:
+        tries = self.folder / f"{unit.id}.tries"
+        first = not tries.exists()
+        with tries.open("a") as lines:
+            lines.write("tried\n")
+        if unit.id in self.killing or (first and unit.id in self.killing_once):
             os._exit(9)
         if unit.id in self.failing:
             raise InputError(unit.id, "is broken", "Mend it.")
         (self.folder / f"{unit.id}.txt").write_text(unit.id)
-        yield f"{unit.id} done"
+        return f"{unit.id} done"
 
-    def is_there(self, unit: Unit) -> bool:
-        return (self.folder / f"{unit.id}.txt").exists()
-
-    def failed(self, unit: Unit, error: InputError) -> Iterator[str]:
-        yield f"failed: {error}"
-
-    def error_of(self, result: str) -> InputError | None:
-        failed = result.startswith("failed: ")
-        return InputError("unit", result, "Mend it.") if failed else None
-
-    def to_json(self, result: str) -> str:
-        return result
-
-    def from_json(self, unit: Unit, written: str) -> str:
-        return written
+    def look(self) -> IsThere[Unit, Value]:
+        return lambda unit, values: (self.folder / f"{unit.id}.txt").exists()

@@ -25,13 +25,26 @@ def scheduler() -> Iterator[str]:
 
 def test_its_workers_do_the_units_of_a_job(scheduler: str, tmp_path: Path) -> None:
     units = [Unit(id=str(number), size=1, inputs="") for number in range(5)]
-    task = Task(Job.begin(tmp_path, {"command": "count"}, None), Counting(tmp_path, ("3",)))
+    task = Task(Job.begin(tmp_path, {"command": "count"}, units), Counting(tmp_path, ("3",)))
     with dask_executor(scheduler) as executor:
         found = [each.result for each in run(task, units, executor)]
-    assert [each for each in found if not each.startswith("failed")] == [
-        f"{number} done" for number in (0, 1, 2, 4)
-    ]
-    assert "is broken" in found[3]
+    contents = [each.content for each in found]
+    assert contents == ["0 done", "1 done", "2 done", None, "4 done"]
+    assert found[3].error.reason == "is broken"
+
+
+def test_a_unit_whose_worker_dies_is_done_by_another(tmp_path: Path) -> None:
+    units = [Unit(id=str(number), size=1, inputs="") for number in range(4)]
+    work = Counting(tmp_path, killing_once=("1",))
+    task = Task(Job.begin(tmp_path, {"command": "count"}, units), work)
+    options = {"processes": True, "dashboard_address": None, "threads_per_worker": 1}
+    with (
+        distributed.LocalCluster(n_workers=2, protocol="tcp://", **options) as cluster,
+        dask_executor(cluster.scheduler_address) as executor,
+    ):
+        contents = [each.result.content for each in run(task, units, executor)]
+    assert contents == [f"{number} done" for number in range(4)]
+    assert len((tmp_path / "1.tries").read_text().splitlines()) == 2
 
 
 def test_a_scheduler_that_is_not_there_is_one_line(tmp_path: Path) -> None:

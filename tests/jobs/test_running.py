@@ -10,10 +10,9 @@ import pytest
 from jobs.counting import Counting
 
 from derain.errors import InputError
-from derain.jobs.job import Job
+from derain.jobs.job import Job, job_status
 from derain.jobs.running import Task, UnfitWorkerError, run
 from derain.jobs.shard import Shard
-from derain.jobs.status import job_status
 from derain.jobs.unit import Unit
 from derain.jobs.workers import TRIES, WorkerPool
 
@@ -33,9 +32,7 @@ def out(tmp_path: Path) -> Path:
 
 
 def begun(out: Path, units: list[Unit] = UNITS, **options: object) -> Job:
-    job = Job.begin(out, {**OPTIONS, **options}, None)
-    job.list_units(units)
-    return job
+    return Job.begin(out, {**OPTIONS, **options}, units)
 
 
 def tries(out: Path, unit: str) -> int:
@@ -46,7 +43,7 @@ def results(
     out: Path, work: Counting, executor: Executor | None = None, units: list[Unit] = UNITS
 ) -> list[tuple[str, bool]]:
     found = run(Task(begun(out, units), work), units, executor)
-    return [(each.result, each.before) for each in found]
+    return [(each.result.content or str(each.result.error), each.before) for each in found]
 
 
 def test_a_second_run_does_nothing_again(out: Path) -> None:
@@ -62,8 +59,8 @@ def test_executors_give_the_same_in_the_same_order(
     with executor() as pool:
         found = results(out, Counting(out, failing=("drive/2",)), pool)
     done = [f"{unit.id} done" for unit in UNITS]
-    assert [each for each, _ in found if not each.startswith("failed")] == [*done[:2], *done[3:]]
-    assert "is broken" in found[2][0]
+    done[2] = "drive/2: is broken. Mend it."
+    assert found == [(each, False) for each in done]
     (failed,) = job_status(out, lambda record: None).failed
     assert failed.unit == "drive/2"
 
@@ -83,7 +80,7 @@ def test_other_options_are_refused_and_named(out: Path) -> None:
         begun(out, size=4)
     with pytest.raises(InputError, match="colour was not there and is red"):
         begun(out, colour="red")
-    anew = Job.begin(out, {**OPTIONS, "size": 4}, None, anew=True)
+    anew = Job.begin(out, {**OPTIONS, "size": 4}, UNITS, anew=True)
     assert next(anew.records_of(UNITS)) == (UNITS[0], None)
 
 
@@ -124,8 +121,7 @@ def test_an_executor_that_has_ended_is_reported_and_the_rest_is_done_later(out: 
 
 
 def test_the_status_names_what_is_to_be_done_again(out: Path) -> None:
-    job = Job.begin(out, OPTIONS, Shard(0, 5, first=1))
-    job.list_units(UNITS)
+    job = Job.begin(out, OPTIONS, UNITS, Shard(0, 5, first=1))
     done = UNITS[:2]
     list(run(Task(job, Counting(out, failing=("drive/0",))), done))
     recorded: list[str] = []
@@ -144,7 +140,7 @@ def test_a_folder_without_a_job_has_no_status(out: Path) -> None:
         (out / ".derain" / "job.json").write_text(content)
         with pytest.raises(InputError, match=r"job\.json, are damaged"):
             Job.at(out)
-    Job.begin(out, OPTIONS, None, anew=True)
+    (out / ".derain" / "job.json").write_text(json.dumps({"options": {}, "shards": None}))
     with pytest.raises(InputError, match="not listed"):
         job_status(out, lambda record: None)
 

@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.files import read_scan
 from derain.files.labels import read_labels
-from derain.jobs.job import FOLDER
+from derain.jobs.job import FOLDER, job_status
 from derain.jobs.shard import Shard
-from derain.jobs.status import job_status
 from derain.jobs.workers import WorkerPool
 from derain.scan import Scan
 from derain.simulation import sequence

@@ -16,6 +16,7 @@ from derain.evaluation.hard_cases import scene
 from derain.export.recorded import RecordedDerainer
 from derain.jobs.shard import Shard
 from derain.jobs.workers import WorkerPool
+from derain.recordings.posed import ODOMETRY, Odometry, with_poses
 from derain.sources.clean_sink import Destination
 from derain.sources.cleaned_bags import BagOptions
 from derain.sources.frame import Frame
@@ -119,7 +120,8 @@ class Failing(Between):
 
     def _judged(self, ready: FrameInWindow) -> Judgement:
         if ready.frame.number in self.bad:
-            raise derain.InputError("network", f"fails at {ready.frame.number}", "Mend it.")
+            with ready.naming_errors():
+                raise derain.InputError("network", f"fails at {ready.frame.number}", "Mend it.")
         return super()._judged(ready)
 
 
@@ -142,12 +144,40 @@ def test_each_scan_of_a_unit_has_one_outcome_whichever_fail(
 ) -> None:
     method = Failing(past, delay, bad)
     for unit in units_of(standing, method, block):
-        judging = UnitCleaning(method, "", Destination("out", None, False, BagOptions()), 1.0, None)
+        out = Destination("out", None, False, BagOptions())
+        judging = UnitCleaning(method, "", None, out, 1.0, None)
         outcomes = list(judging.judged(unit))
-        assert {frame for frame, _ in outcomes} == set(unit.frames)
-        assert len(outcomes) == len(unit.frames)
-        failed = {frame.number for frame, each in outcomes if isinstance(each, derain.InputError)}
+        assert [frame for frame, _, _ in outcomes] == list(unit.frames)  # each when it is met
+        errors = {frame: each for frame, each, _ in outcomes if isinstance(each, derain.InputError)}
+        assert all(error.subject == frame.name for frame, error in errors.items())
+        failed = {frame.number for frame in errors}
         assert failed == bad & {frame.number for frame in unit.frames}
+
+
+def test_odometry_in_units_is_that_of_the_whole_source(drive: Path, tmp_path: Path) -> None:
+    for poses in drive.rglob("poses.txt"):
+        poses.unlink()
+    source, method = derain.named_frames(drive), derain.PersistenceDerainer(threads=1)
+    every = WeatherOptions(every_scan=True)
+    before = with_poses(source, ODOMETRY, threads=1)
+    whole = derain.clean(before, method, tmp_path / "whole", most_removed=1, weather=every)
+    assert any(one.number != other.number for one, other in zip(before, source, strict=True))
+    for division in (None, Division(2, keep_records=True), Division(2, keep_records=True)):
+        report = derain.clean(
+            source,
+            method,
+            tmp_path / "units",
+            placing=Odometry(threads=1),
+            most_removed=1,
+            weather=every,
+            division=division,
+        )
+        assert written(tmp_path / "whole") == written(tmp_path / "units")
+        assert [scan.weather for scan in report.scans] == [scan.weather for scan in whole.scans]
+    assert report.before == SCANS  # and not those of the recording of which a scan failed
+    ungiven = Division(2, keep_records=True)
+    with pytest.raises(derain.InputError, match="poses was found from the scans"):
+        derain.clean(source, method, tmp_path / "units", weather=every, division=ungiven)
 
 
 def test_other_poses_are_other_inputs(drive: Path) -> None:

@@ -75,7 +75,7 @@ def test_methods_are_names_files_derainers_filters_and_functions(
     assert kinds == ["dsor", "outdet", "function"]
     thresholds = [found[title].as_dict()["threshold"] for title in ("path", "model", "file")]
     assert thresholds == [0.5, 0.4, 0.4]
-    scans = [labelled.read(frame) for frame in labelled.frames]
+    scans = [labelled.reader.read(frame) for frame in labelled.frames]
     expected = Counts()
     for scan in scans:
         known = scan.label != 9
@@ -89,7 +89,7 @@ def test_methods_are_names_files_derainers_filters_and_functions(
 def test_scans_in_memory_score_as_the_same_scans_in_files(labelled: LabelledFrames) -> None:
     methods = ["dsor", "position", "intensity"]
     files = [frame.path for frame in labelled.frames]
-    scans = [labelled.read(frame) for frame in labelled.frames]
+    scans = [labelled.reader.read(frame) for frame in labelled.frames]
     rates = labelled.rain_rates
     of_files = bench(methods, files, labelled.card, train=files, rain_rates=rates, **QUICK)
     of_scans = bench(methods, scans, labelled.card, train=scans, **QUICK)
@@ -138,7 +138,7 @@ def test_a_function_that_gives_no_mask_fails_in_every_scan(
     labelled: LabelledFrames, answer
 ) -> None:
     (entry,) = bench_entries({"odd": lambda scan: answer(len(scan))})
-    scans = map(labelled.read, labelled.frames)
+    scans = map(labelled.reader.read, labelled.frames)
     (scores,) = score(scored_methods([entry], 1), scans, labelled.card)
     assert len(scores.failures) == 3
     assert all("Let it return a bool array" in why for why in scores.failures.values())
@@ -193,7 +193,7 @@ def test_filters_share_one_search_and_score_as_they_would_alone(
 
     rows = bench_entries(list(FILTERS))
     monkeypatch.setattr(NeighbourView, "__call__", counted)
-    scans = list(map(labelled.read, labelled.frames))
+    scans = list(map(labelled.reader.read, labelled.frames))
     together = score(scored_methods(rows, threads=1), scans, labelled.card)
     assert searches == [9, 9, 9]  # SSR looks at the most
     monkeypatch.undo()
@@ -227,7 +227,7 @@ def test_what_another_runtime_changes_is_counted_and_its_failure_is_stated(
     assert found["mine"].scores.pooled == found["all"].scores.pooled
     (change,) = found.facts["runtimes"]
     usual = Derainer(KEPT, 1)
-    rain = np.concatenate([usual(labelled.read(labelled.frames[row])) for row in (0, 2)])
+    rain = np.concatenate([usual(labelled.reader.read(labelled.frames[row])) for row in (0, 2)])
     assert (change["method"], change["runtime"]) == ("mine", "rainy int2")
     assert (change["scans"], change["points"]) == (2, len(rain))
     assert change["flipped"] == (~rain).sum()

@@ -39,8 +39,8 @@ def cost(milliseconds: float) -> Cost:
 
 
 def scored(methods: list[BenchEntry], data: LabelledFrames) -> list[Scores]:
-    rates = list(map(data.rain_rate, data.frames))
-    scans = map(data.read, data.frames)
+    rates = [data.rain_rates.get(frame.sequence) for frame in data.frames]
+    scans = map(data.reader.read, data.frames)
     return score(scored_methods(methods, 1), scans, data.card, rain_rates=rates)
 
 

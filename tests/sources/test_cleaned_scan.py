@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from derain.jobs.record import Record
-from derain.sources.cleaned_scan import packed
-from derain.sources.cleaned_totals import CleanedTotals
+from derain.jobs.unit import Record
+from derain.sources.cleaned_scan import CleanedTotals, packed
 from derain.weather.rays import RANGE_BINS, RAY_SECTORS
 from derain.weather.scan_weather import ScanWeather
 
@@ -20,8 +19,11 @@ def weather(drops: int) -> ScanWeather:
 def record(unit: str, *scans: tuple[float | None, int]) -> Record:
     """The record of a unit, of scans by their times and drops."""
     results = [
-        {"points": 1000 + drops, "valid": 1000, "rain": drops, "seconds": seconds}
-        | {"measured": packed(weather(drops))}
+        {
+            "cleaned": {"points": 1000 + drops, "valid": 1000, "rain": drops},
+            "seconds": seconds,
+            "measured": packed(weather(drops)),
+        }
         for seconds, drops in scans
     ]
     return Record(unit, "", "", "", "", 1.0, [], results)
