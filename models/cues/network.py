@@ -9,6 +9,7 @@ from derain.models.cues.beams import in_steps, taken
 from derain.models.cues.brightness import calibrated
 from derain.models.cues.geometry import Geometry
 from derain.models.layers.across_features import AcrossFeatures
+from derain.models.layers.carrier import without_carrier
 from derain.models.layers.steps import NEAREST_POINT, USUAL_RANGE
 from derain.models.relative_outdet.network import both_logits
 from derain.views.intensity_rank import INTENSITY_RANKS
@@ -112,8 +113,9 @@ class CueNetwork(nn.Module):
     ) -> Sequence[Tensor]:
         """Log-odds of rain by geometry, and after each round, float (S,) each.
 
-        Gradients do not pass from the cues to the answers that they come from. Arguments are as of
-        :meth:`forward`, of one scan: step float (), counts float (SHELLS, INTENSITY_RANKS).
+        Gradients do not pass from the cues to the answers that they come from. Outside of training,
+        what is likely of the sensor's carrier is lowered. Arguments are as of :meth:`forward`, of
+        one scan: step float (), counts float (SHELLS, INTENSITY_RANKS).
         """
         distances, neighbours = distances.T, neighbours.T
         seen, far = in_steps(points, distances, neighbours, step)
@@ -129,7 +131,11 @@ class CueNetwork(nn.Module):
             weighed = fusion(torch.cat([given, features]))[0]
             answers.append(rain.scatter(0, doubtful, weighed))
         unknown = (counts[:, 1:].sum() == 0).to(rain.dtype)
-        return [answer + self.without_intensity * unknown for answer in answers]
+        answers = [answer + self.without_intensity * unknown for answer in answers]
+        if self.training:
+            return answers
+        size = counts.double().sum()
+        return [without_carrier(answer, far, size) for answer in answers]
 
 
 def _numbers(neighbours: Tensor, points: int) -> Tensor:
