@@ -7,6 +7,7 @@ import torch
 from torch import Tensor, nn
 
 from derain.models.beam_steps import NEAREST_POINT, USUAL_RANGE, both_logits
+from derain.models.carrier import without_carrier
 from derain.models.cues.geometry import (
     AcrossFeatures,
     Geometry,
@@ -126,8 +127,9 @@ class CueNetwork(nn.Module):
     ) -> Sequence[Tensor]:
         """Log-odds of rain by geometry, and after each round, float (S,) each.
 
-        Gradients do not pass from the cues to the answers that they come from. Arguments are as of
-        :meth:`forward`, of one scan: step float (), counts float (SHELLS, INTENSITY_RANKS).
+        Gradients do not pass from the cues to the answers that they come from. Outside of training,
+        what is likely of the sensor's carrier is lowered. Arguments are as of :meth:`forward`, of
+        one scan: step float (), counts float (SHELLS, INTENSITY_RANKS).
         """
         distances, neighbours = distances.T, neighbours.T
         seen, far = in_steps(points, distances, neighbours, step)
@@ -142,7 +144,11 @@ class CueNetwork(nn.Module):
             weighed = fusion(torch.cat([given, features]))[0]
             answers.append(rain.scatter(0, doubtful, weighed))
         unknown = (counts[:, 1:].sum() == 0).to(rain.dtype)
-        return [answer + self.without_intensity * unknown for answer in answers]
+        answers = [answer + self.without_intensity * unknown for answer in answers]
+        if self.training:
+            return answers
+        size = counts.double().sum()
+        return [without_carrier(answer, far, size) for answer in answers]
 
 
 def _numbers(neighbours: Tensor, points: int) -> Tensor:

@@ -1,7 +1,5 @@
 """The network: a neighbourhood, what the scan holds at its range, the neighbours' opinions."""
 
-import math
-
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
@@ -20,6 +18,7 @@ from derain.models.beam_steps import (
     both_logits,
     farther_by,
 )
+from derain.models.carrier import without_carrier
 
 # A step is the angle to the third nearest beam among those of a point's neighbours. Two of the
 # nearest lie on either side, along the axis of finer resolution, and another return of the point's
@@ -36,19 +35,6 @@ FINEST_ANGLE = 1e-4
 
 # Added to what is divided by, which may be 0.
 EPSILON = 1e-3
-
-# The vehicle or mast that carries a sensor is seen within OF_CARRIER metres, often in a few
-# scattered points that look like drops. Real drops do not end there: from there to BEYOND_CARRIER
-# metres the sensor sees as many again or, where rain is dense, drops that make up SHARE_OF_CARRIER
-# of the scan. Modelling choices.
-OF_CARRIER, BEYOND_CARRIER = 2.0, 6.0
-SHARE_OF_CARRIER = 0.0025
-
-# Where fewer lie beyond than would be expected, near logits are lowered, in proportion to how many
-# are missing: by CERTAINLY_NOT once a third more would be expected than there are. HALF_A_DROP is
-# added to those beyond, since there may be none to divide by.
-CERTAINLY_NOT, OF_A_THIRD = 20.0, 3.0
-HALF_A_DROP = 0.5
 
 
 class RelativeOutDetNetwork(nn.Module):
@@ -109,7 +95,10 @@ class RelativeOutDetNetwork(nn.Module):
             Logits of "not rain" and "rain", float (M, 2).
         """
         rain, far = self.rain_and_range(points, distances, neighbours)
-        return both_logits(rain if self.training else without_carrier(rain, far))
+        if self.training:
+            return both_logits(rain)
+        size = torch.ones_like(rain).double().sum()
+        return both_logits(without_carrier(rain, far, size))
 
     def rain_and_range(
         self, points: Tensor, distances: Tensor, neighbours: Tensor
@@ -149,27 +138,6 @@ def _of_both(layer: nn.Linear, first: Tensor, second: Tensor) -> Tensor:
     width = first.shape[1]
     of_first = functional.linear(first, layer.weight[:, :width], layer.bias)
     return of_first + functional.linear(second, layer.weight[:, width:])
-
-
-def without_carrier(rain: Tensor, far: Tensor) -> Tensor:
-    """Lowers logits of rain right before the sensor where there is hardly any rain beyond.
-
-    It is a rule for scans as they are judged; training leaves it out.
-
-    Args:
-        rain: Logits of rain, float (M,).
-        far: Logarithms of the points' ranges over the usual one, float (M,).
-
-    Returns:
-        Logits, float (M,).
-    """
-    near = far < math.log(OF_CARRIER / USUAL_RANGE)
-    beyond = ~near & (far < math.log(BEYOND_CARRIER / USUAL_RANGE))
-    drops = rain.sigmoid().double()  # of many points sums are taken in float64, as above
-    expected = torch.minimum((drops * near).sum(), SHARE_OF_CARRIER * torch.ones_like(drops).sum())
-    missing = expected / ((drops * beyond).sum() + HALF_A_DROP) - 1
-    taken_back = CERTAINLY_NOT * (OF_A_THIRD * missing).clamp(0, 1).to(rain.dtype)
-    return rain - taken_back * near
 
 
 def in_steps(points: Tensor, distances: Tensor, neighbours: Tensor) -> tuple[Tensor, Tensor]:

@@ -76,6 +76,21 @@ def test_brightness_helps_whatever_its_unit(exported: Derainer) -> None:
     assert iou(alike) < iou(called) - 0.05
 
 
+@pytest.mark.parametrize(("drops", "are_rain"), [(0, False), (60, True)])
+def test_dim_specks_right_before_the_sensor_alone_are_its_carrier(
+    exported: Derainer, drops: int, are_rain: bool
+) -> None:
+    scan = labelled(22, drops=0)
+    far = scan.take(np.linalg.norm(scan.xyz, axis=1) > 6.5)
+    direction = np.random.default_rng(0).normal(size=(drops + 3, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    ranges = np.concatenate([np.linspace(2.5, 5.5, drops), [1.0, 1.2, 1.4]])
+    dim = np.column_stack([direction * ranges[:, None], np.full(drops + 3, 2.0)])
+    points = np.concatenate([np.column_stack([far.xyz, far.intensity]), dim])
+    specks = exported.probability(Scan.of(points.astype(np.float32)))[-3:]
+    assert ((specks > 0.5) == are_rain).all()
+
+
 def test_rows_in_another_order_are_judged_alike(exported: Derainer) -> None:
     scan = labelled(21)
     order = np.random.default_rng(0).permutation(len(scan))
