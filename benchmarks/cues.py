@@ -46,7 +46,7 @@ def main() -> None:
             continue
         found = finder.measured(data)
         methods = [partial(_answer, model, step) for step in range(len(STEPS) + 1)]
-        scores = score(methods, map(found.read, found.frames), found.card, found.distinct)
+        scores = score(methods, map(found.reader.read, found.frames), found.card, found.distinct)
         rows.append([title, *(f"{each.pooled.iou:.3f}" for each in scores)])
     print(markdown_table(["data", *STEPS, WITHHELD], rows))
 

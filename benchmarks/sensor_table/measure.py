@@ -90,7 +90,7 @@ class Measurement:
     def _of_labelled(
         self, title: str, data: LabelledData, found: LabelledFrames, rows: Sequence[BenchEntry]
     ) -> Iterator[Column]:
-        scans = map(found.read, tqdm(found.frames, desc=title, unit="scan", disable=None))
+        scans = map(found.reader.read, tqdm(found.frames, desc=title, unit="scan", disable=None))
         of_rows = score(scored_methods(rows, self.threads), scans, found.card, found.distinct)
         scores = {row.title: each for row, each in zip(rows, of_rows, strict=True)}
         for method, each in scores.items():
