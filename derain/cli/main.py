@@ -93,6 +93,10 @@ def main(arguments: list[str] | None = None) -> int:
         return _cut_off(error)
     except KeyboardInterrupt as interruption:
         return _interrupted(interruption)
+    except RuntimeError as error:
+        if isinstance(error.__cause__, KeyboardInterrupt):  # raised while a class was being made
+            return _interrupted(error.__cause__)
+        raise
     except SystemExit as leaving:
         if isinstance(leaving.__context__, KeyboardInterrupt):  # Lightning leaves in its own way
             return _interrupted(leaving.__context__)

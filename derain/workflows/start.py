@@ -24,7 +24,7 @@ def checkpoint_of(start: str) -> Path:
         start: A checkpoint, an ONNX file, or ``default``.
 
     Raises:
-        InputError: No such file, or no checkpoint beside an ONNX file.
+        InputError: No such file, no checkpoint beside an ONNX file, or that of another model.
     """
     if start == DEFAULT:
         return default_checkpoint()
@@ -41,4 +41,23 @@ def checkpoint_of(start: str) -> Path:
             "Give the checkpoint that it was exported from; `derain learn` leaves student.ckpt in "
             "its folder.",
         )
+    _refuse_another(path, checkpoint)
     return checkpoint
+
+
+def _refuse_another(path: Path, checkpoint: Path) -> None:
+    """Refuses a checkpoint whose model is not that of the ONNX file.
+
+    An export may have changed its threshold and candidates.
+    """
+    from derain.export.model_file import ModelFile
+    from derain.models.checkpoint import load_model
+
+    exported, trained = ModelFile.read(path).spec.as_dict(), load_model(checkpoint).spec.as_dict()
+    kept = exported.keys() - {"threshold", "candidates"}
+    if differing := sorted(key for key in kept if exported[key] != trained[key]):
+        raise InputError(
+            checkpoint,
+            f"is not the checkpoint of {path.name}: they differ in {', '.join(differing)}",
+            "Give the checkpoint that it was exported from.",
+        )

@@ -74,8 +74,15 @@ FOUND_BY_LIGHTNING = ("last", "hpc")
 MESSAGES = logging.getLogger("lightning.pytorch.utilities.rank_zero")
 LOGGERS = ("lightning.pytorch", "lightning.fabric")
 
-# Numbers that torch and the callbacks take as they are.
-NOT_NEGATIVE = ("seed_everything", "panels.scans", "panels.pictures", "errors.pictures")
+# The least of numbers that torch, Lightning and the callbacks take as they are.
+LEAST = {
+    "seed_everything": 0,
+    "trainer.accumulate_grad_batches": 1,
+    "trainer.log_every_n_steps": 0,
+    "panels.scans": 0,
+    "panels.pictures": 0,
+    "errors.pictures": 0,
+}
 
 # Where a training's folder has its checkpoints, and its configuration.
 CHECKPOINTS, CONFIGURATION = "checkpoints", "config.yaml"
@@ -166,10 +173,10 @@ class DerainCLI(LightningCLI):
     def _check_options(self) -> None:
         """Refuses values of options that torch or Lightning would stumble over later."""
         config = self.config[self.config.subcommand]
-        for option in NOT_NEGATIVE:
-            number = Entry(f"--{option}", "", config.get(option))
-            if not isinstance(number.value, bool):  # a seed may be
-                number.whole(0, LARGEST_SEED)
+        for option, least in LEAST.items():
+            value = config.get(option)
+            if isinstance(value, int) and not isinstance(value, bool):  # a seed may be
+                Entry(f"--{option}", "", value).whole(least, LARGEST_SEED)
         arguments = config.model.get("init_args") or {}
         check_hyperparameters(
             {name: Entry(f"--model.{name}", "", value) for name, value in arguments.items()}

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from derain.cli.signals import ENDING, interrupting
+from derain.cli import info
+from derain.cli.main import main
+from derain.cli.signals import ENDING, Interruption, interrupting
 from derain.files.atomic import replacing
 
 # `derain info` that writes its argument, slowly.
@@ -54,6 +56,19 @@ def test_a_command_that_a_signal_ends_leaves_nothing_half_written(
     assert stopped(path, by) == (128 + by, f"derain: interrupted{name}\n")
     assert list(tmp_path.iterdir()) == [path]
     assert path.read_bytes() == b"old"
+
+
+def test_a_signal_ends_a_command_in_which_a_class_is_being_made(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class Attribute:
+        def __set_name__(self, owner: type, name: str) -> None:
+            raise Interruption(signal.SIGTERM)
+
+    # Before Python 3.12, the class raises a RuntimeError in its place.
+    monkeypatch.setattr(info, "main", lambda _: type("Owner", (), {"attribute": Attribute()}))
+    assert main(["info", "scan.bin"]) == 128 + signal.SIGTERM
+    assert capsys.readouterr().err == "derain: interrupted by SIGTERM\n"
 
 
 def test_what_a_killed_command_leaves_goes_with_the_next_and_what_is_in_use_stays(

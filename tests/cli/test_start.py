@@ -16,10 +16,10 @@ from derain.models.outdet import OutDet
 from derain.workflows.start import checkpoint_of
 
 
-def trained(path: Path) -> OutDet:
+def trained(path: Path, neighbours: int = 4) -> OutDet:
     """A blind network, as far as a checkpoint is concerned."""
     lightning.seed_everything(0)
-    model = OutDet(neighbours=4, channels=("range",))
+    model = OutDet(neighbours=neighbours, channels=("range",))
     model.adopt(model.spec_for(load_card("wads")))
     save_model(model, path)
     return model
@@ -31,6 +31,9 @@ def test_an_onnx_file_stands_for_the_checkpoint_beside_it(
     exported = Path(shutil.copy(onnx_model, tmp_path))
     checkpoint = Path(shutil.copy(checkpoint, tmp_path))
     assert checkpoint_of(str(checkpoint)) == checkpoint_of(str(exported)) == checkpoint
+    trained(checkpoint, neighbours=5)
+    with pytest.raises(InputError, match=r"outdet\.onnx: they differ in channels"):
+        checkpoint_of(str(exported))
     checkpoint.unlink()
     with pytest.raises(InputError, match=r"weights are folded, and outdet\.ckpt is not beside it"):
         checkpoint_of(str(exported))

@@ -18,6 +18,7 @@ from derain.export.onnx_file import export
 from derain.models.layers.batch_norm import PixelBatchNorm
 from derain.models.salsanext_lite import SalsaNextLite, SalsaNextLiteNetwork
 from derain.scan import Scan
+from derain.sources.frame import MemoryFrame
 
 from .conftest import randomise
 
@@ -97,7 +98,8 @@ def test_in_eight_bits_nothing_leaves_the_integers_between_image_and_scores(
     scenes = [Scan.of(scene(3000, seed), f"scene {seed}") for seed in range(2)]
     monkeypatch.setattr(onnx_file, "_traced", lambda *_: onnx.load(exported))
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("a scene", scenes[0])])
-    assert export(random_salsanext_lite, tmp_path / "int8.onnx", scenes).holds
+    frames = [MemoryFrame(key=scan.name, scan=scan) for scan in scenes]
+    assert export(random_salsanext_lite, tmp_path / "int8.onnx", frames).holds
     run = optimised(tmp_path / "int8.onnx", tmp_path)
     assert run["QLinearConv"] == convolutions(random_salsanext_lite)
     assert run["QuantizeLinear"] == run["DequantizeLinear"] == 1

@@ -25,6 +25,7 @@ FIT = ("fit", "--config", "outdet_simulated.yaml")
         ("--seed_everything", "-1", "--seed_everything: "),
         ("--trainer.strategy", "foo", "strategy"),
         ("--panels.pictures", "-1", "--panels.pictures: "),
+        ("--trainer.accumulate_grad_batches", "0", "--trainer.accumulate_grad_batches: "),
         ("--trainer.max_epochs", "-3", "--trainer: `max_epochs` must be"),
     ],
 )
