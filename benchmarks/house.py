@@ -44,9 +44,12 @@ from derain.files import labels
 
 root, entered, ways = sys.argv[1], set(), []
 
+def is_ours(name):
+    return name.startswith(root) and "site-packages" not in name
+
 def follow(frame, event, _):
     code = frame.f_code
-    if event != "call" or not code.co_filename.startswith(root):
+    if event != "call" or not is_ours(code.co_filename):
         return
     entered.add((code.co_filename, code.co_qualname))
     if code is labels.write_labels.__code__:
@@ -54,7 +57,7 @@ def follow(frame, event, _):
         while frame is not None:
             way.append(frame.f_code.co_filename)
             frame = frame.f_back
-        ways.append([name for name in way if name.startswith(root)])
+        ways.append([name for name in way if is_ours(name)])
 
 sys.setprofile(follow)
 main(sys.argv[2:])
