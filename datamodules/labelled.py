@@ -126,7 +126,7 @@ def card_of(paths: Sequence[Path], name: str | None) -> DataCard:
         return card
     raise InputError(
         root,
-        "nothing in it says which labels are rain",
+        "nothing in it shows which labels are rain",
         f"Give --card: {', '.join(packaged_cards())}, or a YAML file.",
     )
 

@@ -62,8 +62,9 @@ class LabelledScan:
         frame: The scan.
         answers: Counts of its labels.
         milliseconds: Time of each stage.
-        truth: Its points by their own labels, as :attr:`derain.evaluation.RainCounts.cells` for
-            each title of a :class:`TruthRecord`; None where they are not measured.
+        truth: Its points by their own labels, as
+            :attr:`derain.evaluation.counts.RainCounts.cells` for each title of a
+            :class:`TruthRecord`; None where they are not measured.
         issues: What is odd about it.
         error: Why it has no labels; None where it has.
     """

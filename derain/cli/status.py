@@ -59,7 +59,8 @@ def _lines(status: JobStatus, cleaned: CleanedTotals | None) -> list[str]:
         done, what = cleaned.scans, "scans"
     if seconds := sum(status.seconds.values()):
         workers = len(status.seconds)
-        lines.append(f"{done / seconds:.2f} {what} a second a worker, {workers:,} workers")
+        number = "1 worker" if workers == 1 else f"{workers:,} workers"
+        lines.append(f"{done / seconds:.2f} {what} a second a worker, {number}")
     if cleaned is not None:
         hours = cleaned.worst_hours()
         lines += [f"visibility {weather.visibility}: {hour}" for hour, weather in hours]

@@ -268,7 +268,9 @@ def _learnt(title: str, name: str, learn_from: LearnFrom | None) -> BenchEntry:
         return BenchEntry(title, name, TimedFunction(prior).ready, {"voxel": VOXEL}, learnt=learnt)
     rule = IntensityRule.best(learn_from())
     limits = f"intensity <= {rule.intensity:.4g} and range <= {rule.range:.4g} m"
-    return BenchEntry(title, name, TimedFunction(rule).ready, {"rule": limits}, spec_or_filter=rule)
+    learnt = repr((float(rule.intensity), float(rule.range)))  # not rounded, as the facts are
+    ready = TimedFunction(rule).ready
+    return BenchEntry(title, name, ready, {"rule": limits}, spec_or_filter=rule, learnt=learnt)
 
 
 def _function(function: Callable[[Scan], NDArray[Any]]) -> BenchEntry:

@@ -128,8 +128,8 @@ class CueNetwork(nn.Module):
         """Log-odds of rain by geometry, and after each round, float (S,) each.
 
         Gradients do not pass from the cues to the answers that they come from. Outside of training,
-        what is likely of the sensor's carrier is lowered. Arguments are as of :meth:`forward`, of
-        one scan: step float (), counts float (SHELLS, INTENSITY_RANKS).
+        each of them is lowered where points are likely of the sensor's carrier. Arguments are as of
+        :meth:`forward`, of one scan: step float (), counts float (SHELLS, INTENSITY_RANKS).
         """
         distances, neighbours = distances.T, neighbours.T
         seen, far = in_steps(points, distances, neighbours, step)

@@ -125,7 +125,7 @@ def test_a_model_in_eight_bits_is_scaled_by_scans_like_those_it_will_see(
         (["--int8", "--calibration", "empty"], "empty: "),
         (["--int8", "--calibration", "scans"], "no convolution to quantise"),
         (["--inside", "0.99"], "--inside: bounds candidates, and there are none"),
-        (["--candidates", "scans"], "nothing in it says which labels are rain"),
+        (["--candidates", "scans"], "nothing in it shows which labels are rain"),
         (["--candidates", "bare.bin", "--card", "wads"], "bare.bin: its labels are not at"),
         (["--candidates", "none", "--card", "wads"], "none: "),
         (["--scan", "none.bin"], "none.bin: there is no such file"),
