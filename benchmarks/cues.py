@@ -60,7 +60,7 @@ def _answer(model: CueFusion, step: int, scan: Scan) -> NDArray[np.bool_]:
     own = {name: inputs[name][0] for name in ("step", "counts")}
     with torch.no_grad():
         answers = model.network.answers(**(inputs | own))
-    answer = answers[min(step, len(STEPS) - 1)]
+    answer = answers[step if step < len(STEPS) - 1 else -1]
     return view.back(answer.sigmoid().numpy()) > model.spec.threshold
 
 

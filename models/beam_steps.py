@@ -1,11 +1,8 @@
 """What networks share that see neighbours in steps of the sensor's beams, and shells of range."""
 
 import torch
-from lightning.pytorch.utilities.types import OptimizerLRScheduler
 from torch import Tensor
 from torch.nn import functional
-
-from derain.models.supervised import SupervisedModule
 
 # Nothing is measured nearer than this, metres, nor right above the sensor; both keep every
 # division finite.
@@ -31,12 +28,6 @@ NEGATIVE_SLOPE = 0.1
 # 10 m, which are 1.7 to 90 m, and how far each reaches into the next.
 SHELLS = (-1.8, 2.2, 9)
 SHELL_REACH = 0.35
-
-# Share of the training in which the learning rate rises; then it falls.
-WARM_UP_SHARE = 0.1
-
-# The first learning rate is the highest divided by this, and the last at least this share of it.
-FIRST_DIVISOR, LEAST_SHARE = 25.0, 4e-6
 
 
 def active(features: Tensor) -> Tensor:
@@ -71,30 +62,3 @@ def farther_by(distance: Tensor, dot: Tensor, apart: Tensor) -> Tensor:
 def both_logits(rain: Tensor) -> Tensor:
     """Logits of "not rain", which are 0, and of "rain", float (M, 2), of the latter, float (M,)."""
     return torch.stack([torch.zeros_like(rain), rain], dim=1)
-
-
-def one_cycle(model: SupervisedModule, final_share: float = 0.0) -> OptimizerLRScheduler:
-    """AdamW with a learning rate that rises and falls once in the whole training.
-
-    It goes by the model's highest ``learning_rate`` and its ``weight_decay``.
-
-    Args:
-        model: The model.
-        final_share: How much of the highest learning rate is left at the end.
-
-    Source: L. N. Smith and N. Topin, "Super-Convergence: Very Fast Training of Neural Networks
-        Using Large Learning Rates", 2018.
-    """
-    rate = model.hparams["learning_rate"]
-    optimizer = torch.optim.AdamW(
-        model.parameters(), lr=rate, weight_decay=model.hparams["weight_decay"]
-    )
-    schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimizer,
-        rate,
-        total_steps=max(int(model.trainer.estimated_stepping_batches), 2),
-        pct_start=WARM_UP_SHARE,
-        div_factor=FIRST_DIVISOR,
-        final_div_factor=1 / (FIRST_DIVISOR * max(final_share, LEAST_SHARE)),
-    )
-    return {"optimizer": optimizer, "lr_scheduler": {"scheduler": schedule, "interval": "step"}}

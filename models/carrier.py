@@ -24,8 +24,7 @@ HALF_A_DROP = 0.5
 def without_carrier(rain: Tensor, far: Tensor, size: Tensor) -> Tensor:
     """Lowers logits of rain right before the sensor where there is hardly any rain beyond.
 
-    It is a rule for scans as they are judged: the losses of training leave it out, those of
-    validation and test do not.
+    It is a rule for scans as they are judged, and is not learnt.
 
     Args:
         rain: Logits of rain of M points of a scan, float (M,).

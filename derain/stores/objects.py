@@ -211,7 +211,8 @@ def _entries(filesystem: Any, url: str, path: str) -> list[dict[str, Any]]:
 
 def _object(filesystem: Any, entry: Mapping[str, Any]) -> StoredObject:
     url = filesystem.unstrip_protocol(entry["name"])
-    versions = (str(entry[name]) for name in VERSIONS if entry.get(name) is not None)
+    # Some stores quote an ETag in a listing and not elsewhere.
+    versions = (str(entry[name]).strip('"') for name in VERSIONS if entry.get(name) is not None)
     return StoredObject(url, entry.get("size"), next(versions, ""))
 
 

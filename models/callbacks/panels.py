@@ -58,7 +58,7 @@ class DrawnEpochs:
         self.last: int | None = None
 
     def begins(self, trainer: lightning.Trainer) -> bool:
-        """Whether what is measured now is drawn: asked once, when a validation or test begins."""
+        """Whether what is measured now is drawn; called once, when a validation or test begins."""
         if trainer.sanity_checking or not self.pictures:
             return False
         if trainer.state.fn != TrainerFn.FITTING:
@@ -133,8 +133,8 @@ class ErrorPanels(lightning.Callback):
     of such curves gets, too.
 
     Args:
-        pictures: Of how many epochs to draw pictures in a training, chosen as
-            :class:`DrawnEpochs` says, besides the last validation; 0 draws none.
+        pictures: Of how many epochs to draw pictures in a training, chosen by
+            :class:`DrawnEpochs`, besides the last validation; 0 draws none.
     """
 
     def __init__(self, pictures: int = 10) -> None:

@@ -10,10 +10,10 @@ from torch.nn import functional
 
 from derain.errors import InputError
 from derain.learning.batch import Batch
-from derain.models.beam_steps import both_logits, one_cycle
+from derain.models.beam_steps import both_logits
 from derain.models.cues.network import APART, CueNetwork
 from derain.models.registry import NETWORKS
-from derain.models.supervised import SupervisedModule
+from derain.models.supervised import SupervisedModule, one_cycle
 from derain.scan import Scan
 from derain.views.isolated_points import CHANNELS, IsolatedPointView
 from derain.views.view import IGNORED, View
@@ -106,14 +106,14 @@ class CueFusion(SupervisedModule):
         return both_logits(self._answers(batch)[-1])
 
     def losses(self, batch: Batch) -> tuple[dict[str, Tensor], Tensor]:
-        """Loss of geometry and of each round of the fusion, and the logits of the last round."""
+        """Loss of geometry and of each round of the fusion, and the logits as they are judged."""
         assert batch.target is not None  # the data modules pair these scans with labels
         answers, judged = self._answers(batch), batch.target != IGNORED
         target = batch.target[judged].to(answers[0].dtype)
         weight = self.class_weight[batch.target[judged]]
         each = [
             functional.binary_cross_entropy_with_logits(answer[judged], target, weight)
-            for answer in answers
+            for answer in answers[:-1]  # the last, as judged, is not learnt
         ]
         loss = torch.stack([share * one for share, one in zip(WEIGHTS, each, strict=True)]).sum()
         losses = {"loss": loss, "geometry": each[0], "fusion": each[-1]}
@@ -128,7 +128,7 @@ class CueFusion(SupervisedModule):
         return one_cycle(self, self.hparams["final_share"])
 
     def _answers(self, batch: Batch) -> list[Tensor]:
-        """Log-odds of rain by geometry and after each round, float (S,) each, of all scans."""
+        """All answers of :meth:`CueNetwork.answers`, float (S,) each, of all scans."""
         of_scans = [self.network.answers(**scan) for scan in _scans_of(batch)]
         return [torch.cat(answers) for answers in zip(*of_scans, strict=True)]
 

@@ -125,11 +125,12 @@ class CueNetwork(nn.Module):
         step: Tensor,
         counts: Tensor,
     ) -> Sequence[Tensor]:
-        """Log-odds of rain by geometry, and after each round, float (S,) each.
+        """Log-odds of rain by geometry, after each round, and as they are judged, float (S,) each.
 
-        Gradients do not pass from the cues to the answers that they come from. Outside of training,
-        each of them is lowered where points are likely of the sensor's carrier. Arguments are as of
-        :meth:`forward`, of one scan: step float (), counts float (SHELLS, INTENSITY_RANKS).
+        The last are those of the last round, lowered where points are likely of the sensor's
+        carrier. Gradients do not pass from the cues to the answers that they come from. Arguments
+        are as of :meth:`forward`, of one scan: step float (), counts float (SHELLS,
+        INTENSITY_RANKS).
         """
         distances, neighbours = distances.T, neighbours.T
         seen, far = in_steps(points, distances, neighbours, step)
@@ -145,10 +146,7 @@ class CueNetwork(nn.Module):
             answers.append(rain.scatter(0, doubtful, weighed))
         unknown = (counts[:, 1:].sum() == 0).to(rain.dtype)
         answers = [answer + self.without_intensity * unknown for answer in answers]
-        if self.training:
-            return answers
-        size = counts.double().sum()
-        return [without_carrier(answer, far, size) for answer in answers]
+        return [*answers, without_carrier(answers[-1], far, counts.double().sum())]
 
 
 def _numbers(neighbours: Tensor, points: int) -> Tensor:

@@ -18,10 +18,9 @@ from torch import Tensor
 
 from derain.errors import InputError
 from derain.learning.batch import Batch
-from derain.models.beam_steps import one_cycle
 from derain.models.registry import NETWORKS
 from derain.models.relative_outdet.network import STEP_NEIGHBOUR, RelativeOutDetNetwork
-from derain.models.supervised import SupervisedModule
+from derain.models.supervised import SupervisedModule, one_cycle
 from derain.scan import Scan
 from derain.views.neighbours import NeighbourView
 from derain.views.view import View
