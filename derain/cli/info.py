@@ -122,8 +122,7 @@ def main(arguments: argparse.Namespace) -> int:
         option = "--anew" if arguments.anew else "--shard"
         raise InputError(option, "needs a folder of records", "Name one by --out.")
     if arguments.grid:
-        paths = within([Path(name) for name in arguments.files], arguments.topic)
-        frames = named_frames(paths, arguments.columns)
+        frames = named_frames(arguments.files, arguments.columns, topic=arguments.topic)
         fit = fit_grid([frame.read() for frame in frames]).as_dict()
         print(json.dumps(fit) if arguments.json else yaml.safe_dump(fit, sort_keys=False).rstrip())
         return 0

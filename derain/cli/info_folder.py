@@ -19,7 +19,7 @@ from derain.evaluation.contents import (
 from derain.evaluation.text_tables import plain_table
 from derain.jobs.running import Submits, Task, values
 from derain.simulation.manifest import manifest_of
-from derain.sources.folders import find_layout
+from derain.sources.folders import find_layout, recordings_below
 from derain.sources.frame import Frame
 from derain.sources.units import Division, FrameUnit, folder_of_paths, shared_options, units_of
 from derain.stores.url import Place
@@ -35,7 +35,8 @@ class FolderFacts:
 
     Attributes:
         folder: The folder.
-        layout: What its folders are called; None where scans lie directly in it.
+        layout: What its folders are called; None where scans lie directly in it, or in folders of
+            recordings.
         card: The data card that names the classes; None where none does.
         card_rests_on: What the card was chosen by.
         by_rain_rate: What was counted, by rain rate in mm/h in ascending order; None last, for
@@ -55,7 +56,7 @@ class FolderFacts:
 
     @property
     def folders(self) -> list[str] | None:
-        """Names of its folders of scans and labels; None where scans lie directly in it."""
+        """Names of its folders of scans and labels; None where it is no data set."""
         return None if self.layout is None else [self.layout.scans, self.layout.labels]
 
     @property
@@ -195,7 +196,8 @@ def draw(facts: FolderFacts, picture: Path) -> None:
 def _layout(folder: Path, card: DataCard | None, stated: str | None) -> Layout | None:
     """The layout of a folder: as stated, by its data card, or by the names of its folders."""
     if stated is None:
-        return find_layout(folder, layouts_for(card))
+        is_of_recordings = bool(recordings_below(folder, layouts_for(card)))
+        return None if is_of_recordings else find_layout(folder, layouts_for(card))
     folders = stated.split(",")
     if len(folders) != 2:
         raise InputError(

@@ -19,7 +19,6 @@ import math
 import sys
 from pathlib import Path
 
-from derain.bags.names import within
 from derain.cli.options import add_columns, add_json, add_threads, add_topic
 from derain.cli.outputs import exit_code, print_error, print_facts, print_lines
 from derain.recordings.odometry import Registration
@@ -62,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     keep_freed_memory()
-    source = named_frames(within(arguments.sequences, arguments.topic), arguments.columns)
+    source = named_frames(arguments.sequences, arguments.columns, topic=arguments.topic)
 
     def show(frame: Frame, registration: Registration, stopwatch: Stopwatch) -> None:
         _print_registration(frame, registration, stopwatch, arguments.json)

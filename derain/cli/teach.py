@@ -29,7 +29,6 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from derain.bags.names import within
 from derain.cards.card import load_card, packaged_cards
 from derain.cards.known import layouts_for
 from derain.cli.method_options import add_method_and_scans, method_and_scans, method_of
@@ -84,11 +83,12 @@ def main(arguments: argparse.Namespace) -> int:
     method = over_recording(method_of(name, arguments))
     card = None if arguments.card is None else load_card(arguments.card)
     found = named_frames(
-        within(paths_of(scans), arguments.topic),
+        paths_of(scans),
         arguments.columns,
         labelled=True,
         layouts=layouts_for(card),
         recordings=True,
+        topic=arguments.topic,
     )
     refuse_to_overwrite(arguments.out, found)
     source = with_given_poses(found, arguments).map(

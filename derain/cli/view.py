@@ -139,11 +139,12 @@ def _view_recording(arguments: argparse.Namespace) -> int:
     }
     card = None if arguments.card is None else load_card(arguments.card)
     found = named_frames(
-        within(arguments.scans, arguments.topic),
+        arguments.scans,
         arguments.columns,
         labelled=card is not None,
         layouts=layouts_for(card),
         recordings=True,
+        topic=arguments.topic,
     )
     source = placed(found, arguments.poses, arguments.threads).map(
         lambda frame: frame.with_intensity_times(arguments.intensity_scale)

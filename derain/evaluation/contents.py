@@ -14,14 +14,14 @@ import numpy as np
 from derain.cards.layout import Layout, folder_above
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS
-from derain.files.labels import label_beside
 from derain.files.names import scan_stem
 from derain.files.reading import reading
 from derain.jobs.running import ValueWork
 from derain.simulation.manifest import RAIN_RATE, manifest_of
-from derain.sources.folders import frames_of, listed_scans, scan_folders
+from derain.sources.folders import frames_of, listed_scans, named_frames, scan_folders
 from derain.sources.frame import Frame
-from derain.sources.source import Source
+from derain.sources.recordings import recordings_of
+from derain.sources.source import Frames, Source
 from derain.sources.units import FrameUnit
 
 
@@ -105,15 +105,15 @@ def find_sequences(
     Args:
         root: A folder with a folder of sequences, the folder of sequences, a sequence, its folder
             of scans, or any folder of scans, which counts as one sequence.
-        layout: Names of the folders; None for a folder of scans.
+        layout: Names of the folders; None for a folder of scans, or of recordings.
         columns: Names of the columns of files that do not name them.
 
     Raises:
         InputError: A folder without sequences or scans, or a damaged weather record.
     """
     if layout is None:
-        frames = frames_of(listed_scans([root]), label_beside, columns)
-        return [SequenceOfFrames(root.absolute().name, frames, None)]
+        recordings = recordings_of(named_frames(root, columns, labelled=True))
+        return [SequenceOfFrames(each[0].sequence, Frames(each), None) for each in recordings]
     folders = scan_folders(root, layout)
     if not folders:
         raise InputError(

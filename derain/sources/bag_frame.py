@@ -39,6 +39,11 @@ class BagFrame(FileFrame):
         return ""
 
     @property
+    def folder(self) -> Path:
+        """The folder of results that a copy of its bag goes to, relative to that of all results."""
+        return Path(self.key).parent.parent
+
+    @property
     def label_beside_bag(self) -> Path:
         """Path of its labels: ``drive.labels/000012.label`` beside the bag."""
         bag = self.clouds.bag.path
@@ -87,14 +92,14 @@ class BagFrame(FileFrame):
         return sha256(self.clouds.message(self.cloud_number).data).hexdigest()
 
 
-def bag_frames(path: Path, labelled: bool = False, by_name: bool = False) -> list[BagFrame]:
+def bag_frames(path: Path, labelled: bool = False, prefix: str = "") -> list[BagFrame]:
     """The clouds that a path into a bag names, in the order in which they were recorded.
 
     Args:
         path: A bag; a topic in it, ``bag/topic``; or one of its clouds, ``bag/topic/000012`` or
             ``bag/000012``.
         labelled: Whether frames have their labels: ``<stem of the bag>.labels/000012.label``.
-        by_name: Whether keys begin with the stem of the bag, as where several are named.
+        prefix: First part of all keys; empty where the bag is the only one.
 
     Raises:
         InputError: A path that leads into no bag; a bag that cannot be read; no such topic or
@@ -108,8 +113,8 @@ def bag_frames(path: Path, labelled: bool = False, by_name: bool = False) -> lis
             f"there is no such cloud: {clouds.topic.name} has {len(clouds):,}",
             "Name another topic, or count from 000000.",
         )
-    folder = f"{stem(clouds.bag.path)}/" if by_name else ""
-    frames = (bag_frame(clouds, each, f"{folder}{each:06d}") for each in numbers)
+    keys = {each: f"{prefix}/{each:06d}" if prefix else f"{each:06d}" for each in numbers}
+    frames = (bag_frame(clouds, each, key) for each, key in keys.items())
     return list(frames) if labelled else [frame.without_labels() for frame in frames]
 
 

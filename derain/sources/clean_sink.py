@@ -96,7 +96,7 @@ class CleanSink:
         """Every file and bag that it may write."""
         for frame in self._source:
             if isinstance(frame, StoredBag):
-                yield self.folder / frame.written_name
+                yield self.folder / frame.written_path
             elif not self._bags.takes(frame):
                 yield from self._files.files_of(frame)
         yield from self._bags.targets()
@@ -145,7 +145,7 @@ class CleanSink:
         return isinstance(frame, StoredBag) or self._bags.takes(frame)
 
     def _refuse_own_bag(self, bag: StoredBag) -> None:
-        target = self.folder / bag.written_name
+        target = self.folder / bag.written_path
         if target in (bag.path, bag.path.parent) or target.is_relative_to(bag.path):
             raise InputError(
                 url_of(self.folder), f"would overwrite {bag.name}", "Give --out another folder."

@@ -2,6 +2,7 @@
 
 import os
 import re
+from collections import Counter
 from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -73,8 +74,11 @@ class CleanedBags:
         self.out = out
         self.options = options
         self.probability = probability
-        self._whole = _whole_topics(source)
-        for clouds in self._whole:
+        self._targets = {
+            clouds: out / folder / written_name(clouds.bag)
+            for clouds, folder in _whole_topics(source).items()
+        }
+        for clouds in self._targets:
             self._refuse_clashes(clouds)
         self._stack = ExitStack()
         self._current: tuple[CloudTopic, BagCopy] | None = None
@@ -83,11 +87,11 @@ class CleanedBags:
 
     def takes(self, frame: Frame) -> bool:
         """Whether a frame is of a bag that is copied."""
-        return isinstance(frame, BagFrame) and frame.clouds in self._whole
+        return isinstance(frame, BagFrame) and frame.clouds in self._targets
 
     def targets(self) -> list[Path]:
         """Paths of the copies."""
-        return [self.out / written_name(clouds.bag) for clouds in self._whole]
+        return list(self._targets.values())
 
     def write(self, judgement: Judgement) -> None:
         """Writes a cloud without its rain; clouds are given in the order of their bag.
@@ -163,16 +167,17 @@ class CleanedBags:
             return
         clouds, copy = self._current
         self._current = None
-        target = self.out / written_name(clouds.bag)
+        target = self._targets[clouds]
         try:
             with self._stack, writing(target):
+                target.parent.mkdir(parents=True, exist_ok=True)
                 _move(copy.finish(), target)
                 self.written.append(target)
         except InputError as error:
             self._broken[clouds] = error
 
     def _refuse_clashes(self, clouds: CloudTopic) -> None:
-        target, bag = self.out / written_name(clouds.bag), clouds.bag.path
+        target, bag = self._targets[clouds], clouds.bag.path
         remedy = "Give --out another folder."
         there, within = Path(os.path.realpath(target)), Path(os.path.realpath(bag))
         if there in (within, within.parent):
@@ -197,13 +202,12 @@ class CleanedBags:
                 raise InputError(option, f"{bag} has a topic {name} already", "Name another.")
 
 
-def _whole_topics(source: Iterable[Frame]) -> list[CloudTopic]:
-    """The topics all of whose clouds are in a source."""
-    numbers: dict[CloudTopic, int] = {}
-    for frame in source:
-        if isinstance(frame, BagFrame):
-            numbers[frame.clouds] = numbers.get(frame.clouds, 0) + 1
-    return [clouds for clouds, count in numbers.items() if count == len(clouds)]
+def _whole_topics(source: Iterable[Frame]) -> dict[CloudTopic, Path]:
+    """The topics all of whose clouds are in a source, with the folders of their copies."""
+    frames = [frame for frame in source if isinstance(frame, BagFrame)]
+    folders = {frame.clouds: frame.folder for frame in frames}
+    numbers = Counter(frame.clouds for frame in frames)
+    return {clouds: folders[clouds] for clouds in folders if numbers[clouds] == len(clouds)}
 
 
 def _move(made: Path, target: Path) -> None:

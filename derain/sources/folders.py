@@ -2,14 +2,15 @@
 
 import os
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from glob import escape, glob
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 
 from derain.bags.names import SUFFIXES as BAG_SUFFIXES
-from derain.bags.names import bags_at, is_bag, split
+from derain.bags.names import bags_at, is_bag, split, stem
 from derain.cards.known import known_layouts, label_of
 from derain.cards.layout import Layout, sequence_of
 from derain.errors import InputError
@@ -18,6 +19,7 @@ from derain.files import DEFAULT_COLUMNS, RECORDS, find_scans
 from derain.files.format import FORMATS
 from derain.files.names import scan_stem, scan_suffix
 from derain.files.reading import reading
+from derain.jobs.job import FOLDER as JOB_RECORDS
 from derain.scan import Scan
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame, MemoryFrame
@@ -29,11 +31,19 @@ from derain.system.notices import warn_once
 # Scans may be written as text, but beside folders of scans a text is a note or a record.
 TEXTS = (".csv", ".txt")
 
-# Gives the clouds of a bag, or a path into one, with or without labels, by its name or not.
-FramesOfBag = Callable[[Path, bool, bool], Sequence[Frame]]
+# Gives the clouds of a bag, or a path into one, with or without labels, with the first part of
+# their keys, which may be empty.
+FramesOfBag = Callable[[Path, bool, str], Sequence[Frame]]
 
 # What a program gives: one of them, or several of one kind or another.
 GivenScans = Source | Scan | Frame | str | Path | Iterable[Scan | Frame | str | Path]
+
+
+def _clouds_of_bag(bag: Path, labelled: bool, prefix: str) -> Sequence[Frame]:
+    # What reads bags is imported only where there are some.
+    from derain.sources.bag_frame import bag_frames
+
+    return bag_frames(bag, labelled, prefix)
 
 
 def named_frames(
@@ -42,6 +52,7 @@ def named_frames(
     labelled: bool = False,
     layouts: Sequence[Layout] | None = None,
     recordings: bool = False,
+    topic: str | None = None,
 ) -> Frames:
     """The scans that a user names.
 
@@ -53,60 +64,97 @@ def named_frames(
     Args:
         paths: One path or several: scans, folders with scans directly in them, data sets or parts
             of them whose folders are named as in a layout, bags, and paths into bags
-            (:func:`~derain.sources.bag_frame.bag_frames`); or ``example``, which comes with derain.
+            (:func:`~derain.sources.bag_frame.bag_frames`); folders of recordings, in which all of
+            these are found at any depth; or ``example``, which comes with derain.
         columns: Names of the columns of files that do not name them.
         labelled: Whether labels are to be read, from where :func:`~derain.cards.known.label_of`
             finds them by the layouts.
-        layouts: What the folders of data sets may be called, the likeliest first; by default as the
-            packaged data cards say. An empty sequence takes no data sets.
+        layouts: What the folders of data sets may be called, the likeliest first; by default as in
+            the packaged data cards. An empty sequence takes neither data sets nor folders of
+            recordings.
         recordings: Whether each folder is a recording, which numbers its scans as others do.
+        topic: Topic of the bags among them; None where each has only one of clouds.
 
     Returns:
         The scans in the order they are named, those of a folder sorted by name. Each has its stem
         for a key; where a data set is named, or several recordings, its path from the folder that
-        all scans lie below.
+        all scans lie below. In a folder of recordings the key begins with the path of the recording
+        from there, which stays when others are added.
 
     Raises:
-        InputError: A path that does not exist, a folder without scans, or a bag that cannot be
-            read.
+        InputError: A path that does not exist, a folder without scans, a bag that cannot be read,
+            or a topic where there is no bag.
     """
     given = [paths] if isinstance(paths, str | Path) else paths
-    return frames_named(given, columns, labelled, layouts, recordings, _clouds_of_bag)
+    finder = FrameFinder(columns, labelled, layouts, recordings, topic)
+    return finder.frames([or_example(Path(path)) for path in given])
 
 
-def frames_named(
-    given: Iterable[str | Path],
-    columns: Sequence[str],
-    labelled: bool,
-    layouts: Sequence[Layout] | None,
-    recordings: bool,
-    frames_of_bag: FramesOfBag,
-) -> Frames:
-    """The same as :func:`named_frames`, with bags in another way.
+@dataclass(frozen=True)
+class FrameFinder:
+    """Finds the scans at paths; attributes are as for :func:`named_frames`.
 
-    Args:
-        given: The paths.
-        columns: As there.
-        labelled: As there.
-        layouts: As there.
-        recordings: As there.
-        frames_of_bag: Gives the frames of each bag.
+    Attributes:
+        columns: Names of the columns of files that do not name them.
+        labelled: Whether labels are to be read.
+        layouts: What the folders of data sets may be called.
+        recordings: Whether each folder is a recording.
+        topic: Topic of the bags.
+        frames_of_bag: Gives the clouds of each bag.
     """
-    named = [or_example(Path(path)) for path in given]
-    found = [_scans_or_bags(path, layouts) for path in named]
-    scans = [scan for of_path, _ in found for scan in of_path]
-    # A data set's scans lie in several folders, those of any other path in one.
-    of_data_set = any(_several_folders(of_path) for of_path, _ in found)
-    by_path = of_data_set or (recordings and _several_folders(scans))
-    where = partial(label_of, layouts=layouts) if labelled else lambda _: None
-    files = iter(frames_of(scans, where, columns, relative_keys(scans) if by_path else None))
-    several = len(named) > 1 or any(len(bags) > 1 for _, bags in found)
-    frames: list[Frame] = []
-    for of_path, bags in found:
-        frames += islice(files, len(of_path))
-        for bag in bags:
-            frames += frames_of_bag(bag, labelled, several)
-    return Frames(frames)
+
+    columns: Sequence[str] = DEFAULT_COLUMNS
+    labelled: bool = False
+    layouts: Sequence[Layout] | None = None
+    recordings: bool = False
+    topic: str | None = None
+    frames_of_bag: FramesOfBag = _clouds_of_bag
+
+    def frames(self, paths: Sequence[Path]) -> Frames:
+        """The scans at paths, in their order; errors as :func:`named_frames` raises them."""
+        inside = [recordings_below(path, self.layouts) for path in paths]
+        if self.topic is not None and not any(map(bags_at, chain(paths, *inside))):
+            raise InputError("--topic", "no bag is named that could have it", "Leave it out.")
+        if not any(inside):
+            return Frames(self._named(paths))
+        frames: list[Frame] = []
+        for path, recordings in zip(paths, inside, strict=True):
+            frames += self._below(path, recordings) if recordings else self._named([path])
+        return Frames(frames)
+
+    def _below(self, folder: Path, recordings: Sequence[Path]) -> Iterator[Frame]:
+        """The scans of the recordings in a folder, with the paths of these in their keys."""
+        for path in recordings:
+            name = path.relative_to(folder).as_posix()
+            if is_bag(path):
+                bag_name = path.relative_to(folder).with_name(stem(path)).as_posix()
+                yield from self._clouds(path, bag_name)
+                continue
+            for frame in self._named([path]):
+                yield replace(frame, key=f"{name}/{frame.key}", sequence=name)
+
+    def _named(self, paths: Sequence[Path]) -> list[Frame]:
+        """The scans at paths, none of which is a folder of recordings."""
+        found = [_scans_or_bags(path, self.layouts) for path in paths]
+        scans = [scan for of_path, _ in found for scan in of_path]
+        # A data set's scans lie in several folders, those of any other path in one.
+        of_data_set = any(_several_folders(of_path) for of_path, _ in found)
+        by_path = of_data_set or (self.recordings and _several_folders(scans))
+        where = partial(label_of, layouts=self.layouts) if self.labelled else lambda _: None
+        keys = relative_keys(scans) if by_path else None
+        files = iter(frames_of(scans, where, self.columns, keys))
+        several = len(paths) > 1 or any(len(bags) > 1 for _, bags in found)
+        frames: list[Frame] = []
+        for of_path, bags in found:
+            frames += islice(files, len(of_path))
+            for bag in bags:
+                frames += self._clouds(bag, _bag_name(bag) if several else "")
+        return frames
+
+    def _clouds(self, bag: Path, prefix: str) -> Sequence[Frame]:
+        """The clouds of a bag, or at a path into one."""
+        within = bag if self.topic is None else bag / self.topic.strip("/")
+        return self.frames_of_bag(within if is_bag(bag) else bag, self.labelled, prefix)
 
 
 def source_of(scans: GivenScans, columns: Sequence[str] = DEFAULT_COLUMNS) -> Source:
@@ -275,6 +323,54 @@ def find_layout(root: Path, layouts: Iterable[Layout] | None = None) -> Layout |
     return next((layout for layout in known if scan_folders(root, layout)), None)
 
 
+def recordings_below(folder: Path, layouts: Sequence[Layout] | None = None) -> list[Path]:
+    """Finds the recordings in a folder of them: folders of scans, sequences and bags at any depth.
+
+    Args:
+        folder: The folder, or any other path.
+        layouts: As for :func:`named_frames`.
+
+    Returns:
+        Their paths, sorted; none where the path is itself what :func:`named_frames` takes whole: a
+        file, a folder with scans or with nothing but bags directly in it, or a data set. Hidden
+        folders, and those of results with records of a job, are passed over.
+    """
+    if layouts == () or not os.path.isdir(folder) or is_bag(folder) or _holds_scans(folder):
+        return []
+    found = _recordings_at(folder, layouts)
+    return found if {*found} != (_sequences_at(folder, layouts) or {*bags_at(folder)}) else []
+
+
+def _recordings_at(folder: Path, layouts: Sequence[Layout] | None) -> list[Path]:
+    """All recordings in a folder, which may be one itself, sorted."""
+    if is_bag(folder) or _holds_scans(folder):
+        return [folder]
+    sequences = _sequences_at(folder, layouts)
+    found = {*sequences, *bags_at(folder)}
+    if all(sequence.parent == folder for sequence in sequences):  # else it is a data set
+        for inside in _folders_in(folder):
+            found.update(() if inside in found else _recordings_at(inside, layouts))
+    return sorted(found)
+
+
+def _sequences_at(folder: Path, layouts: Sequence[Layout] | None) -> set[Path]:
+    """The sequences of a data set, or of a part of one."""
+    layout = find_layout(folder, layouts)
+    return set() if layout is None else {each.parent for each in scan_folders(folder, layout)}
+
+
+def _folders_in(folder: Path) -> Iterator[Path]:
+    """The folders in a folder; none that is hidden, has records of a job, or leads back up."""
+    real = Path(os.path.realpath(folder))
+    with reading(folder), os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.name.startswith(".") or not entry.is_dir():
+                continue
+            leads_up = entry.is_symlink() and real.is_relative_to(os.path.realpath(entry.path))
+            if not leads_up and not (folder / entry.name / JOB_RECORDS).exists():
+                yield folder / entry.name
+
+
 def _scans_or_bags(path: Path, layouts: Sequence[Layout] | None) -> tuple[list[Path], list[Path]]:
     """The scans that a path stands for, or else its bags and paths into them."""
     folders = []
@@ -289,15 +385,15 @@ def _scans_or_bags(path: Path, layouts: Sequence[Layout] | None) -> tuple[list[P
     return listed_scans(folders or [path]), []
 
 
+def _bag_name(bag: Path) -> str:
+    """The name of a bag that a path leads into, without its suffix."""
+    found = split(bag)
+    assert found is not None
+    return stem(found[0])
+
+
 def _several_folders(scans: Iterable[Path]) -> bool:
     return len({scan.parent for scan in scans}) > 1
-
-
-def _clouds_of_bag(bag: Path, labelled: bool, by_name: bool) -> Sequence[Frame]:
-    # What reads bags is imported only where there are some.
-    from derain.sources.bag_frame import bag_frames
-
-    return bag_frames(bag, labelled, by_name)
 
 
 def _holds_scans(folder: Path) -> bool:

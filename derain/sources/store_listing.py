@@ -5,14 +5,16 @@ layout they have; only what lies beside the scans is fetched: times, poses, meta
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import TypeVar
 
-from derain.bags.names import BAG_METADATA, split, stem, within
+from derain.bags.names import BAG_METADATA, split, stem
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS, RECORDS
+from derain.jobs.job import FOLDER, JOB
 from derain.sources.file_frame import FileFrame
-from derain.sources.folders import frames_named, named_frames
+from derain.sources.folders import FrameFinder, named_frames
 from derain.sources.frame import Frame
 from derain.sources.source import Frames
 from derain.sources.stored_frame import StoredBag, StoredScan
@@ -45,7 +47,7 @@ def frames_at(
     places = list(places)
     urls = [str(place) for place in places if is_url(place)]
     if not urls:
-        return named_frames(within(map(Path, places), topic), columns)
+        return named_frames(map(Path, places), columns, topic=topic)
     if len(urls) < len(places):
         other = next(place for place in places if not is_url(place))
         raise InputError(
@@ -55,8 +57,8 @@ def frames_at(
         )
     with mirror() as lent, changed_warnings(lent.with_urls):
         listing = _Listing(lent, (stored for url in urls for stored in listed(url)))
-        paths = within([lent.path_of(url) for url in urls], topic)
-        return listing.stored(frames_named(paths, columns, False, None, False, listing.bag))
+        finder = FrameFinder(columns, topic=topic, frames_of_bag=listing.bag)
+        return listing.stored(finder.frames([lent.path_of(url) for url in urls]))
 
 
 class _Listing:
@@ -64,20 +66,22 @@ class _Listing:
 
     Args:
         lent: An empty mirror.
-        objects: The objects; hidden ones, as the records of a job are, are passed over.
+        objects: The objects; hidden ones are passed over, but for the file that shows a folder to
+            have records of a job.
     """
 
     def __init__(self, lent: Mirror, objects: Iterable[StoredObject]) -> None:
         self._lent = lent
         self._root = lent.root
         self._stamps: dict[Path, str] = {}
-        found = ((stored.path, stored) for stored in objects)
-        self._objects = {path: stored for path, stored in found if not _is_hidden(path)}
+        stored = [(each.path, each) for each in objects]
+        self._objects = {path: each for path, each in stored if not _is_hidden(path)}
         read = {path for path in self._objects if path.name in READ_WHEN_LISTED}
-        lent.mark(path for path in self._objects if path not in read)
+        jobs = (path for path, _ in stored if path.match(f"{FOLDER}/{JOB}"))
+        lent.mark(chain((path for path in self._objects if path not in read), jobs))
         lent.fetch(self._objects[path] for path in read)
 
-    def bag(self, path: Path, labelled: bool, by_name: bool) -> list[Frame]:
+    def bag(self, path: Path, labelled: bool, prefix: str) -> list[Frame]:
         """The bag that a path of the mirror leads into, as one frame."""
         found = split(path)
         assert found is not None
@@ -85,12 +89,12 @@ class _Listing:
         files = [bag] if bag in self._objects else [*self._inside(bag)]
         return [
             StoredBag(
-                key=stem(bag),
+                key=prefix or stem(bag),
                 sequence=stem(bag),
                 path=bag,
                 objects=tuple(self._objects[file] for file in files),
                 inner=inner,
-                by_name=by_name,
+                prefix=prefix,
             )
         ]
 

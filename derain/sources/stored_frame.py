@@ -108,13 +108,13 @@ class StoredBag(StoredFrame):
 
     Attributes:
         inner: The topic, as a part of a path; empty where the bag has only one of clouds.
-        by_name: Whether keys of clouds begin with the stem of the bag.
+        prefix: First part of the keys of its clouds; empty where the bag is the only one.
         seconds: When the cloud was taken that it stands for; None where it stands for all.
         trajectory: Poses of the clouds, where they are given.
     """
 
     inner: str = ""
-    by_name: bool = False
+    prefix: str = ""
     seconds: float | None = None
     trajectory: Trajectory | None = None
 
@@ -124,9 +124,10 @@ class StoredBag(StoredFrame):
         return ""
 
     @property
-    def written_name(self) -> str:
-        """Name of its copy: of ROS 1 a file, of ROS 2 a folder."""
-        return self.path.name if self.path.suffix.lower() == ROS1_SUFFIX else stem(self.path)
+    def written_path(self) -> Path:
+        """Path of its copy in the folder of results: of ROS 1 a file, of ROS 2 a folder."""
+        is_ros1 = self.path.suffix.lower() == ROS1_SUFFIX
+        return Path(self.prefix).parent / (self.path.name if is_ros1 else stem(self.path))
 
     @property
     def time(self) -> float | None:
@@ -137,7 +138,7 @@ class StoredBag(StoredFrame):
         """Its clouds."""
         from derain.sources.bag_frame import bag_frames
 
-        clouds = bag_frames(where.root / self.path / self.inner, by_name=self.by_name)
+        clouds = bag_frames(where.root / self.path / self.inner, prefix=self.prefix)
         frames: list[FileFrame] = [
             replace(
                 cloud,

@@ -268,3 +268,17 @@ def test_what_cannot_be_written_is_refused_before_any_work(
     assert (outcome.code, outcome.err.count("\n")) == (2, 1)
     assert reason in outcome.err
     assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_bags_of_one_name_in_a_folder_of_recordings_are_written_apart(
+    tmp_path: Path, storage: Storage, run_derain
+) -> None:
+    for name in ("a", "b"):
+        (tmp_path / "fleet" / name).mkdir(parents=True)
+        bag = small_bag(tmp_path / "fleet" / name, storage)
+    once = run_derain(*RUN, bag, "--out", tmp_path / "once")
+    outcome = run_derain(*RUN, tmp_path / "fleet", "--topic", POINTS, "--out", tmp_path / "out")
+    assert (once.code, outcome.code, outcome.said) == (0, 0, [])
+    for name in ("a", "b"):
+        made = bag_path(tmp_path / "out" / name, storage)
+        assert read_bag(made) == read_bag(bag_path(tmp_path / "once", storage))

@@ -23,6 +23,7 @@ from derain.sources.folders import (
     source_of,
 )
 from derain.sources.frame import MemoryFrame
+from derain.sources.sink import FolderSink
 
 REHEARSE3D = Layout(scans="lidar_radar_pcd", labels="lidar_radar_labels", lidar="innoviz")
 DRIVES = Layout(sequences="drives", scans="lidar", labels="truth")
@@ -196,3 +197,61 @@ def test_what_is_no_scan_is_refused(tmp_path: Path) -> None:
         source_of([{}])  # type: ignore[list-item]
     with pytest.raises(InputError, match="there is no such file"):
         source_of(tmp_path / "absent.bin")
+
+
+@pytest.fixture
+def fleet(tmp_path: Path) -> Path:
+    """A folder of recordings of all makes, beside what is none of them."""
+    root = tmp_path / "fleet"
+    touch(
+        *(root / "2024/a" / name for name in ("0.pcd", "1.pcd", "times.txt")),
+        *(root / "2024/b/velodyne" / name for name in ("0.bin", "1.bin")),
+        *(root / "2025/set/sequences" / name / "velodyne/7.bin" for name in ("00", "01")),
+        *(root / name / "0.bin" for name in (".hidden", "results")),
+        root / "results/.derain/job.json",
+        root / "notes/list.txt",
+    )
+    (root / "2024/up").symlink_to(root)
+    return root
+
+
+FOUND = {
+    "2024/a": ["0", "1"],
+    "2024/b": ["0", "1"],
+    "2025/set/sequences/00": ["7"],
+    "2025/set/sequences/01": ["7"],
+}
+
+
+def test_a_folder_of_recordings_is_all_of_them(fleet: Path) -> None:
+    frames = named_frames(fleet)
+    keys = [f"{folder}/{scan}" for folder, scans in FOUND.items() for scan in scans]
+    assert [frame.key for frame in frames] == keys
+    assert [frame.sequence for frame in frames] == [str(Path(key).parent) for key in keys]
+    assert [frame.number for frame in frames] == [0, 1, 0, 1, 0, 0]
+    one_by_one = named_frames([fleet / folder for folder in FOUND])
+    assert [frame.name for frame in frames] == [frame.name for frame in one_by_one]
+
+
+def test_what_is_found_keeps_its_key_when_a_recording_is_added(fleet: Path) -> None:
+    before = {frame.name: frame.key for frame in named_frames(fleet)}
+    touch(fleet / "2023/c/0.bin", fleet / "2025/set/sequences/02/velodyne/7.bin", fleet / "d/0.npy")
+    after = {frame.name: frame.key for frame in named_frames(fleet)}
+    assert len(after) == len(before) + 3
+    assert after.items() > before.items()
+
+
+def test_one_sequence_is_no_folder_of_recordings_to_what_takes_no_data_sets(fleet: Path) -> None:
+    with pytest.raises(InputError, match="no scans"):
+        named_frames(fleet, layouts=())
+
+
+def test_results_among_the_recordings_are_not_cleaned_once_more(fleet: Path) -> None:
+    touch(fleet / "cleaned/2024/a/0.pcd")  # of a run that kept no records
+    source = named_frames(fleet)
+    results = fleet / "cleaned"
+    for sink in (FolderSink(results), FolderSink(fleet / "other", removed=results)):
+        with pytest.raises(InputError) as caught:
+            sink.refuse_clashes(source)
+        assert caught.value.subject == str(fleet / "cleaned/2024/a/0.pcd")
+    FolderSink(fleet / "results").refuse_clashes(source)

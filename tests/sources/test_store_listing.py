@@ -94,3 +94,16 @@ def test_a_bag_is_one_frame_with_all_of_its_files(tmp_path: Path) -> None:
 def test_paths_and_urls_are_not_mixed(drives: Path) -> None:
     with pytest.raises(InputError, match="two commands"):
         frames_at([stored(drives), drives])
+
+
+def test_a_folder_of_recordings_is_the_same_in_a_store(drives: Path) -> None:
+    root = drives / "sequences"
+    for name in ("10", "9"):  # to be no data set
+        (root / name / "velodyne").rename(root / name / "points")
+    (root / "results" / ".derain").mkdir(parents=True)
+    (root / "results" / ".derain" / "job.json").write_text("{}")
+    (root / "results" / "0.bin").write_bytes(bytes(16))
+    near, far = derain.named_frames(root), frames_at([stored(root)])
+    assert [frame.key for frame in far] == [frame.key for frame in near]
+    assert [frame.sequence for frame in far] == [frame.sequence for frame in near]
+    assert {frame.sequence for frame in far} == {"10/points", "9/points"}
