@@ -3,13 +3,15 @@
     python -m benchmarks.ingredients --plan benchmarks/ingredients.yaml --out ingredients
 
 The file names data sets, each by the command of derain that makes it, and variants, each by the
-options of its `derain fit`; `{name}` stands for the folder of a data set there. All are trained
+options of its `derain fit`; `{name}` stands for the folder of a data set there, and `{name -place}`
+for that without the worlds that were drawn at a place. All are trained
 with one seed, one after the other. A variant whose model is there, made by the same commands, is
 not trained again: a sweep that was stopped goes on. What is scored on is that of
 across_sensors.yaml or of another `--columns`, where labels have a part in the scores alone.
 """
 
 import argparse
+import json
 import re
 import shlex
 import shutil
@@ -31,6 +33,9 @@ from benchmarks.sensor_table.report import add_places, report
 # Folder of the data sets; no variant's is called so.
 DATA_SETS = "data-sets"
 
+# Name of a data set in the options of a variant, and the place that is left out of it.
+DATA_SET = re.compile(r"\{(\w+)( -\w+)?\}")
+
 
 @dataclass(frozen=True)
 class Variant:
@@ -38,7 +43,8 @@ class Variant:
 
     Attributes:
         title: What it is called.
-        fit: Options of ``derain fit``; ``{name}`` stands for the folder of a data set.
+        fit: Options of ``derain fit``; ``{name}`` stands for the folder of a data set, ``{name
+            -place}`` for that without a place.
         export: Further options of ``derain export``.
         thresholds: A row of the table for each; none takes the model as it is.
     """
@@ -108,15 +114,14 @@ class Sweep:
 
     def commands(self, variant: Variant) -> list[list[str]]:
         """What makes the model: of the data sets that it names, of the training, and the export."""
-        sets = {f"{{{name}}}": str(self.folder / DATA_SETS / name) for name in self.data}
-        folder = self.folder / variant.folder
-        made = [
-            [*shlex.split(self.data[name.strip("{}")]), "--out", out]
-            for name, out in sets.items()
-            if name in variant.fit
-        ]
+        sets, folder = self.folder / DATA_SETS, self.folder / variant.folder
+        named = dict.fromkeys(name for name, _ in DATA_SET.findall(variant.fit))
+        made = [[*shlex.split(self.data[name]), "--out", str(sets / name)] for name in named]
         configurations, others = _options(shlex.split(self.common))
-        own, changes = _options([_filled(word, sets) for word in shlex.split(variant.fit)])
+        filled = DATA_SET.sub(
+            lambda found: shlex.quote(str(sets / "".join(found.groups("")))), variant.fit
+        )
+        own, changes = _options(shlex.split(filled))
         kept = ["--checkpoint.dirpath", str(folder), "--checkpoint.filename", "model"]
         log = ["--trainer.logger.save_dir", str(folder / "runs")]
         export = ["--out", str(self.model(variant)), *shlex.split(variant.export)]
@@ -147,6 +152,8 @@ class Sweep:
         folder.mkdir(parents=True)
         with (folder / "log.txt").open("w") as log:
             for command in self.commands(variant):
+                if command[0] == "fit":
+                    self._leave_places_out(variant)
                 done = subprocess.run(
                     [DERAIN, *command], stdout=log, stderr=subprocess.STDOUT, check=False
                 )
@@ -155,12 +162,33 @@ class Sweep:
         record.write_text(commands, "utf-8")  # last: what is stopped before is made anew
         return None
 
+    def _leave_places_out(self, variant: Variant) -> None:
+        """Makes the data sets of a variant that are others without one place."""
+        for name, without in DATA_SET.findall(variant.fit):
+            if without:
+                sets = self.folder / DATA_SETS
+                leave_out(sets / name, without.removeprefix(" -"), sets / f"{name}{without}")
 
-def _filled(word: str, sets: Mapping[str, str]) -> str:
-    """A word of a command, with the folders of data sets for their names in braces."""
-    for name, folder in sets.items():
-        word = word.replace(name, folder)
-    return word
+
+def leave_out(worlds: Path, place: str, folder: Path) -> None:
+    """Makes a data set of worlds without those that were drawn at a place, by a link to the others.
+
+    Args:
+        worlds: The data set.
+        place: The place.
+        folder: Folder to make. One that is there is made anew.
+    """
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    (folder / "sequences").symlink_to((worlds / "sequences").absolute())
+    manifest = json.loads((worlds / "manifest.json").read_text("utf-8"))
+    for part, names in manifest["split"].items():
+        drawn = {name: worlds / "sequences" / name / "drawn.yaml" for name in names}
+        places = {
+            name: yaml.safe_load(file.read_text("utf-8"))["place"] for name, file in drawn.items()
+        }
+        manifest["split"][part] = [name for name in names if places[name] != place]
+    (folder / "manifest.json").write_text(json.dumps(manifest), "utf-8")
 
 
 def _options(words: Sequence[str]) -> tuple[list[str], list[str]]:
