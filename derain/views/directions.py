@@ -22,6 +22,10 @@ MOST_RETURNS = 3
 FEWEST_PAIRS = 20
 CLEARLY_MORE = 5
 
+# Where slabs of inclination are laid end to end, each begins so many degrees behind the one before,
+# which is longer than any of them.
+SLAB_SPACING = 1000
+
 
 def directions(xyz: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Azimuth and inclination of every point.
@@ -80,30 +84,32 @@ def _near_pairs(
         int64 (P, 2), the lower number first, and degrees, float64 (P,). A direction that has more
         than MOST_RETURNS others about it has some of them only.
     """
-    # Slabs of inclination are laid end to end and sorted along. What two slabs divide lies in the
-    # middle of one of those that are moved by half their height.
-    found = [_along_slabs(azimuth, inclination, tolerance, moved) for moved in (0.0, 0.5)]
+    # Slabs are bands of inclination, each as high as two tolerances. A pair across a border of two
+    # slabs lies in the middle of one of the other set, which is moved by half their height.
+    found = [_pairs_in_slabs(azimuth, inclination, tolerance, shift) for shift in (0.0, 0.5)]
     pairs, gap = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    # Most pairs are found in both sets.
     _, first = np.unique(pairs[:, 0] * len(azimuth) + pairs[:, 1], return_index=True)
     return pairs[first], gap[first]
 
 
-def _along_slabs(
-    azimuth: NDArray[np.float64], inclination: NDArray[np.float64], tolerance: float, moved: float
+def _pairs_in_slabs(
+    azimuth: NDArray[np.float64], inclination: NDArray[np.float64], tolerance: float, shift: float
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Those of the pairs that lie in one slab, of twice the tolerance in height."""
+    """Those of the pairs of :func:`_near_pairs` that lie in one slab, each pair once.
+
+    Args:
+        azimuth: As there.
+        inclination: As there.
+        tolerance: As there.
+        shift: How far the slabs are moved down, in heights of a slab.
+    """
     height = 2 * tolerance
-    slab = np.floor(inclination / height + moved)
-    # Along the arc, since a degree of azimuth is the shorter the higher up it is.
-    shorter = np.cos(np.radians((slab + 0.5 - moved) * height).clip(-np.pi / 2, np.pi / 2))
-    along, turn = azimuth * shorter, 360 * shorter
-    # What lies just behind the end of the circle lies just before its beginning.
-    again = np.flatnonzero(along + turn / 2 <= tolerance)
-    point = np.concatenate([np.arange(len(azimuth)), again])
-    place = np.concatenate([along, along[again] + turn[again]]) + slab[point] * 1000
-    order = np.argsort(place, kind="stable")
-    point, place = point[order], place[order]
+    slab = np.floor(inclination / height + shift)
+    middle = (slab + 0.5 - shift) * height
+    point, place = _laid_end_to_end(azimuth, slab, middle, tolerance)
     pairs, gaps = [], []
+    # Along the places, what is near a direction is among the next few.
     for step in range(1, MOST_RETURNS + 1):
         one, other = point[:-step], point[step:]
         across = np.abs(inclination[one] - inclination[other])
@@ -112,6 +118,35 @@ def _along_slabs(
         pairs.append(np.sort(np.stack([one[near], other[near]], axis=1), axis=1))
         gaps.append(gap[near])
     return np.concatenate(pairs), np.concatenate(gaps)
+
+
+def _laid_end_to_end(
+    azimuth: NDArray[np.float64],
+    slab: NDArray[np.float64],
+    middle: NDArray[np.float64],
+    tolerance: float,
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Directions in the order of their places on one line, which holds slab after slab.
+
+    Args:
+        azimuth: float64 (M,), degrees in [-180, 180].
+        slab: Number of the slab of each, float64 (M,).
+        middle: Inclination of its middle, float64 (M,), degrees.
+        tolerance: Degrees.
+
+    Returns:
+        Numbers of the directions, int64 (M + W,), and their places, ascending, float64 (M + W,), in
+        degrees along the arc. W of them come twice, at both ends of their slab: those near the seam
+        of the circle.
+    """
+    # The higher up, the shorter is the arc of a degree of azimuth.
+    shortened = np.cos(np.radians(middle.clip(-90, 90)))
+    along, circle = azimuth * shortened, 360 * shortened
+    seam = np.flatnonzero(along + circle / 2 <= tolerance)
+    point = np.concatenate([np.arange(len(azimuth)), seam])
+    place = np.concatenate([along, along[seam] + circle[seam]]) + slab[point] * SLAB_SPACING
+    order = np.argsort(place, kind="stable")
+    return point[order], place[order]
 
 
 def _uncrowded(pairs: NDArray[np.int64], near: NDArray[np.bool_], points: int) -> NDArray[np.bool_]:
