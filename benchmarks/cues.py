@@ -1,32 +1,40 @@
-"""What each cue of the model that comes with derain gives: its answers after each of its steps.
+"""What each cue of the model that comes with derain gives and costs: models with some of them.
 
     python -m benchmarks.cues --shared ../shared
 
-IoU at the model's threshold by geometry alone, after the first and the second time that brightness
-is weighed, and of scans whose intensities are withheld, where brightness is silent.
+IoU at the model's threshold of models that are exported with geometry alone, with brightness
+weighed once, and with all, and of scans whose intensities are withheld, where brightness is silent;
+and milliseconds from scan to mask of the WADS sample, in turns, on two threads.
 """
 
 import argparse
+import tempfile
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from benchmarks.across_sensors import PLAN
 from benchmarks.sensor_table.inputs import DataFinder
 from benchmarks.sensor_table.plan import Plan
+from benchmarks.turns import milliseconds_in_turns
 from derain.default import default_checkpoint
 from derain.evaluation.scores import score
 from derain.evaluation.text_tables import markdown_table
+from derain.export.onnx_file import export
+from derain.export.runtime import Derainer
 from derain.models.checkpoint import load_model
 from derain.models.cues import CueFusion
 from derain.scan import Scan
 
-STEPS = ("geometry alone", "brightness weighed once", "twice: the model")
+# Models by how often they weigh brightness.
+TITLES = ("geometry alone", "brightness weighed once", "twice: the model")
 WITHHELD = "the model, without intensities"
+
+TIMED = "WADS sample"
 
 
 def main() -> None:
@@ -36,32 +44,47 @@ def main() -> None:
     parser.add_argument(
         "--work", type=Path, default=Path("runs/across_sensors"), help="what is made on the way"
     )
+    parser.add_argument("--rounds", type=int, default=15, help="timed runs of each model")
     arguments = parser.parse_args()
-    model = load_model(default_checkpoint()).eval()
-    assert isinstance(model, CueFusion)
+    derainers = {title: _with_rounds(rounds) for rounds, title in enumerate(TITLES)}
+    methods = [*derainers.values(), partial(_without_intensity, derainers[TITLES[-1]])]
     plan, rows = Plan.of_yaml(PLAN), []
     finder = DataFinder(arguments.shared, arguments.work / "simulated")
     for title, data in plan.labelled.items():
         if data.taken:
             continue
         found = finder.measured(data)
-        methods = [partial(_answer, model, step) for step in range(len(STEPS) + 1)]
         scores = score(methods, map(found.reader.read, found.frames), found.card, found.distinct)
         rows.append([title, *(f"{each.pooled.iou:.3f}" for each in scores)])
-    print(markdown_table(["data", *STEPS, WITHHELD], rows))
+        if title == TIMED:
+            times = _milliseconds(derainers, found.reader.read(found.frames[0]), arguments.rounds)
+            rows.append([f"{title}, ms", *times, "-"])
+    print(markdown_table(["data", *TITLES, WITHHELD], rows))
 
 
-def _answer(model: CueFusion, step: int, scan: Scan) -> NDArray[np.bool_]:
-    """Which points are rain after a step, or at last without intensities, bool (N,)."""
-    if step == len(STEPS):
-        scan = replace(scan, intensity=None)
-    view = model.spec.make_view()(scan)
-    inputs = {name: torch.from_numpy(array) for name, array in view.inputs().items()}
-    own = {name: inputs[name][0] for name in ("step", "counts")}
-    with torch.no_grad():
-        answers = model.network.answers(**(inputs | own))
-    answer = answers[step if step < len(STEPS) - 1 else -1]
-    return view.back(answer.sigmoid().numpy()) > model.spec.threshold
+def _with_rounds(rounds: int) -> Derainer:
+    """The default model with no more than some rounds of brightness."""
+    model = load_model(default_checkpoint())
+    assert isinstance(model, CueFusion)
+    model.network.rounds = model.network.rounds[:rounds]
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "model.onnx"
+        export(model, file)
+        derainer = Derainer(file, threads=2)
+    derainer.warns = False
+    return derainer
+
+
+def _without_intensity(derainer: Derainer, scan: Scan) -> NDArray[np.bool_]:
+    return derainer(replace(scan, intensity=None))
+
+
+def _milliseconds(derainers: Mapping[str, Derainer], scan: Scan, rounds: int) -> list[str]:
+    """The median of each model, which take turns."""
+    times = milliseconds_in_turns(
+        {title: partial(derainer, scan) for title, derainer in derainers.items()}, rounds
+    )
+    return [f"{np.median(each):.0f}" for each in times.values()]
 
 
 if __name__ == "__main__":
