@@ -108,7 +108,9 @@ RARE = (
 
 def add_arguments(parser: Parser) -> None:
     """Declares the command's arguments."""
-    add_method_and_scans(parser, help="scans, folders of scans, of recordings or of a data set, bags, or URLs")
+    add_method_and_scans(
+        parser, help="scans, folders of scans or of recordings, data sets, bags, or URLs"
+    )
     parser.add_argument("--out", type=place_of, required=True, help="folder or URL to write to")
     add_json(parser)
     add_columns(parser)

@@ -31,8 +31,8 @@ from derain.system.notices import warn_once
 # Scans may be written as text, but beside folders of scans a text is a note or a record.
 TEXTS = (".csv", ".txt")
 
-# Gives the clouds of a bag, or a path into one, with or without labels, with the first part of
-# their keys, which may be empty.
+# Gives the clouds of a bag, or at a path into one, with or without labels, whose keys begin with a
+# prefix unless it is empty.
 FramesOfBag = Callable[[Path, bool, str], Sequence[Frame]]
 
 # What a program gives: one of them, or several of one kind or another.
@@ -125,13 +125,12 @@ class FrameFinder:
     def _below(self, folder: Path, recordings: Sequence[Path]) -> Iterator[Frame]:
         """The scans of the recordings in a folder, with the paths of these in their keys."""
         for path in recordings:
-            name = path.relative_to(folder).as_posix()
-            if is_bag(path):
-                bag_name = path.relative_to(folder).with_name(stem(path)).as_posix()
-                yield from self._clouds(path, bag_name)
-                continue
-            for frame in self._named([path]):
-                yield replace(frame, key=f"{name}/{frame.key}", sequence=name)
+            of_bag, name = is_bag(path), path.relative_to(folder).as_posix()
+            if of_bag:
+                name = path.relative_to(folder).with_name(stem(path)).as_posix()
+            for frame in self._clouds(path, name) if of_bag else self._named([path]):
+                key = frame.key if of_bag else f"{name}/{frame.key}"
+                yield replace(frame, key=key, sequence=name)
 
     def _named(self, paths: Sequence[Path]) -> list[Frame]:
         """The scans at paths, none of which is a folder of recordings."""

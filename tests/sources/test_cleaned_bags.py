@@ -25,6 +25,7 @@ from benchmarks.recorded_bags import (
 from derain.bags.cloud_message import CDR, ROS1, CloudMessage
 from derain.export.runtime import Derainer
 from derain.files.labels import read_labels
+from derain.sources.folders import named_frames
 
 RUN = ("run", "ror", "--set", "radius=2", "--set", "neighbours=3")
 
@@ -276,6 +277,8 @@ def test_bags_of_one_name_in_a_folder_of_recordings_are_written_apart(
     for name in ("a", "b"):
         (tmp_path / "fleet" / name).mkdir(parents=True)
         bag = small_bag(tmp_path / "fleet" / name, storage)
+    frames = named_frames(tmp_path / "fleet", topic=POINTS)
+    assert [frame.sequence for frame in frames] == [*3 * ["a/drive"], *3 * ["b/drive"]]
     once = run_derain(*RUN, bag, "--out", tmp_path / "once")
     outcome = run_derain(*RUN, tmp_path / "fleet", "--topic", POINTS, "--out", tmp_path / "out")
     assert (once.code, outcome.code, outcome.said) == (0, 0, [])
