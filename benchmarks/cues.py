@@ -52,7 +52,7 @@ def main() -> None:
 
 
 def _answer(model: CueFusion, step: int, scan: Scan) -> NDArray[np.bool_]:
-    """Which points are rain after a step, or at last without intensities, bool (N,)."""
+    """True for points that are rain after a step, or at last without intensities, bool (N,)."""
     if step == len(STEPS):
         scan = replace(scan, intensity=None)
     view = model.spec.make_view()(scan)

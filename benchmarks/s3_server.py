@@ -32,7 +32,7 @@ class Faults:
     _lock: Lock = field(default_factory=Lock)
 
     def next(self, is_read: bool) -> tuple[bool, bool]:
-        """Whether the next request is refused, and whether what it reads is cut off."""
+        """Draws whether the next request is refused, and whether its read is cut off."""
         with self._lock:
             self.requests += 1
             self.reads += is_read

@@ -184,6 +184,6 @@ def _refuse_missing(channels: Sequence[str], count: NDArray[np.float64]) -> None
         if not known:
             raise InputError(
                 f"channel '{name}'",
-                "no training scan holds a number of that name",
-                "Name columns of the scans, with data.loading.columns where files do not.",
+                "no training scan has a column of numbers of that name",
+                "Name columns of the scans; data.loading.columns names those of unnamed files.",
             )

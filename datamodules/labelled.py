@@ -73,7 +73,7 @@ def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> L
     if len(paths) > 1:
         raise InputError(
             root,
-            "is a data set, of which no part can be taken beside other scans",
+            "is a data set, and cannot be combined with other scans",
             "Name it alone, or its sequences one by one.",
         )
     if taught:

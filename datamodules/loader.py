@@ -62,7 +62,7 @@ def scan_loader(
     if part == "train" and loading.augmentation.moves_the_sensor and not view.window.is_one_scan:
         raise InputError(
             "augmentation",
-            "would turn a scan and leave those around it, which the network sees too",
+            "would turn a scan but not the scans around it, which the network also sees",
             "Set rotation_probability and mirror_probability to 0.",
         )
     reader = FrameReader(task.card, loading.intensity_scale, task.columns)

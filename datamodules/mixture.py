@@ -175,7 +175,7 @@ class Mixture(ScanDataModule):
                 if scan.channel(channel) is None:
                     raise InputError(
                         f"part '{name}'",
-                        f"{scan.name} has no {channel}, which the model is to see",
+                        f"{scan.name} has no {channel}, which the model needs",
                         "Leave the part out, or leave the channel out of --model.channels.",
                     )
 

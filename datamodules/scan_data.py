@@ -58,7 +58,7 @@ class Loading:
                 raise InputError(name, f"{value} is too few", f"Give {fewest} or more.")
 
     def counts_once(self, card: DataCard) -> bool:
-        """Whether points at one position are measured once."""
+        """True if points at one position are measured once."""
         return card.deduplicate if self.deduplicate is None else self.deduplicate
 
 
@@ -76,7 +76,7 @@ class ScanData(ABC):
 
     @property
     def distinct(self) -> bool:
-        """Whether points at one position are measured once."""
+        """True if points at one position are measured once."""
         return self.loading.counts_once(self.card)
 
     @abstractmethod
@@ -113,7 +113,7 @@ class ScanData(ABC):
 
     @property
     def _reads_labels(self) -> bool:
-        """Whether training and validation need labels."""
+        """True if training and validation need labels."""
         return True
 
     @property

@@ -139,7 +139,7 @@ def across(
 
 
 def in_sector(scan: Scan, width: float, generator: np.random.Generator) -> NDArray[np.bool_]:
-    """Which points are in a sector around one of the valid ones, of which there must be one.
+    """True for points in a sector around one of the valid points; at least one must be valid.
 
     Args:
         scan: The scan.

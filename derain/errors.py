@@ -1,4 +1,4 @@
-"""The error and the warning that a user meets, and the name that a misspelt one may stand for."""
+"""The error and the warning for users, and suggestions for misspelt names."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -12,7 +12,7 @@ LONGEST_SUBJECT = 5000
 
 
 class InputError(ValueError):
-    """Something the user gave cannot be used.
+    """An input of the user cannot be used.
 
     The command line prints it on one line and exits with code 2.
 
@@ -77,7 +77,7 @@ def _cut(text: str, longest: int) -> str:
 
 
 def printable(text: str) -> str:
-    """The same text with escapes for what a terminal must not be sent.
+    """The text with escapes in place of control characters, which a terminal must not receive.
 
     Names of files and what stands in them may hold control sequences, line breaks, marks that turn
     the direction of writing, and bytes that are no text.
@@ -86,5 +86,5 @@ def printable(text: str) -> str:
 
 
 def reason_of(error: Exception) -> str:
-    """What an error says, in one line; its kind where it says nothing, as a bare assert does."""
+    """The message of an error in one line; its class if it has none, as a bare assert."""
     return " ".join(str(error).split()) or type(error).__name__

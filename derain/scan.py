@@ -46,7 +46,7 @@ class PointHeader(Protocol):
 
 @runtime_checkable
 class PartialHeader(Protocol):
-    """A header that knows which parts of its file are not in the scan, and so are not written."""
+    """A header that lists the parts of its file that are not in the scan, so are not written."""
 
     @property
     def left_out(self) -> tuple[str, ...]:
@@ -291,7 +291,7 @@ class Scan:
 
     @cached_property
     def _knows_intensity(self) -> bool:
-        """Whether any intensity is a number that a sensor can measure."""
+        """True if any intensity is a number that a sensor can measure."""
         assert self.intensity is not None
         return bool((np.abs(self.intensity) <= LARGEST_VALUE).any())
 

@@ -98,7 +98,7 @@ class Model:
 
 
 def is_as_exported(content: bytes, known: dict[str, Any]) -> bool:
-    """Whether the checksum is right; it is missing only in files laid out as derain 0.1's were."""
+    """True if the checksum is right; it is missing only in files laid out as derain 0.1's were."""
     if "sha256" not in known:
         early = known.keys() <= {"spec", "versions", "proof"}
         return early and not known["spec"].keys() & {"candidates", "training"}
@@ -120,7 +120,7 @@ def valid_rows(points: Points) -> NDArray[np.bool_]:
 
 
 def knows_intensity(points: Points) -> bool:
-    """Whether any intensity is one that a sensor can measure."""
+    """True if any intensity is one that a sensor can measure."""
     with np.errstate(invalid="ignore"):
         return bool((np.abs(points[:, 3]) <= LARGEST_VALUE).any())
 
@@ -278,7 +278,7 @@ def sampled(points: Points, first: NDArray[np.int64]) -> tuple[float, bool]:
 def one_return(
     xyz: NDArray[np.float64], neighbours: NDArray[np.int64], distances: NDArray[np.float32]
 ) -> NDArray[np.bool_]:
-    """Which neighbours are one return with the point itself, bool (Q, k - 1)."""
+    """True for neighbours that are one return with the point itself, bool (Q, k - 1)."""
     length = np.linalg.norm(xyz, axis=1)
     own, others = length[neighbours[:, :1]], length[neighbours[:, 1:]]
     apart, farther = distances[:, 1:].astype(np.float64), others - own

@@ -62,7 +62,7 @@ class Toy(SupervisedModule):
         return NeighbourView(self.hparams["neighbours"], self.channels)
 
     def accepts_view(self, view: View) -> bool:
-        """Whether it can take what a Spec's view gives: as many neighbours as it has inputs for."""
+        """True if it can take what a Spec's view gives: as many neighbours as it has inputs for."""
         return isinstance(view, NeighbourView) and view.neighbours == self.hparams["neighbours"]
 
     def forward(self, points: Tensor, distances: Tensor, neighbours: Tensor) -> Tensor:

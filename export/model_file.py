@@ -179,7 +179,7 @@ def _metadata(content: bytes) -> str:
 
 
 def _has_external_data(content: bytes) -> bool:
-    """Whether some tensor is to be read from another file, which could be any."""
+    """True if some tensor is to be read from another file, which could be any."""
     pending = [("model", memoryview(content))]
     while pending:
         kind, message = pending.pop()

@@ -88,7 +88,7 @@ class Case:
 
     @property
     def holds(self) -> bool:
-        """Whether the exported model may be trusted on this scan."""
+        """True if the exported model may be trusted on this scan."""
         near = self.bounds.difference is None or self.difference <= self.bounds.difference
         share = self.bounds.flipped
         alike = share is None or self.flipped <= max(1, share * self.points)
@@ -116,7 +116,7 @@ class Proof:
 
     @property
     def holds(self) -> bool:
-        """Whether every case does, and both find enough of the same rain."""
+        """True if every case does, and both find enough of the same rain."""
         other_holds = self.by_other is None or self.by_other.holds
         return other_holds and self.finds_enough and all(case.holds for case in self.cases)
 
@@ -127,7 +127,7 @@ class Proof:
 
     @property
     def finds_enough(self) -> bool:
-        """Whether the IoU of the rain is as great as it must be; if it is undefined, it is not."""
+        """True if the IoU of the rain is as great as it must be; if it is undefined, it is not."""
         return self.least_rain_iou is None or self.rain_iou >= self.least_rain_iou
 
     @property

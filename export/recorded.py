@@ -100,11 +100,11 @@ class RecordedDerainer(Method):
 
     @property
     def waiting(self) -> int:
-        """How many frames were pushed and are not answered for."""
+        """Number of frames that were pushed and not answered."""
         return self._frames.waiting
 
     def starts_new_recording(self, frame: Frame) -> bool:
-        """Whether a frame does not follow those that wait."""
+        """True if a frame does not follow those that wait."""
         return self.waiting > 0 and self._frames.starts_new_recording(frame)
 
     def push(
@@ -132,7 +132,7 @@ class RecordedDerainer(Method):
         self._end_recording()
 
     def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
-        """What is odd about a scan for the model, and about the scans around it."""
+        """Warnings about a scan for the model, and about the scans around it."""
         yield from self.model.issues(judgement)
         yield from self._frames.damage(judgement.scan)
         yield from self._odd.get(judgement.scan, ())
@@ -244,11 +244,11 @@ class RecordedDerainer(Method):
 
 
 def _fails(scan: Scan) -> ScanIssue:
-    """What is odd about a scan beside one that the model cannot judge."""
+    """Warnings about a scan beside one that the model cannot judge."""
     name = scan.name or "a scan"
     return ScanIssue(
         "beside a scan that cannot be judged",
-        f"the model cannot judge {name}, which is beside it: the rays of that show nothing",
+        f"the model cannot judge {name}, which is beside it: the rays of that scan are not used",
     )
 
 

@@ -180,11 +180,11 @@ class Derainer(Method):
 
     @property
     def waiting(self) -> int:
-        """How many frames were pushed and are not answered for: they wait for frames after them."""
+        """Number of frames that were pushed and not answered: they wait for frames after them."""
         return self._recent.waiting
 
     def starts_new_recording(self, frame: Frame) -> bool:
-        """Whether pushing a frame would let go of those that wait: it does not follow them."""
+        """True if pushing a frame would let go of those that wait: it does not follow them."""
         return self._recent.waiting > 0 and self._recent.starts_new_recording(frame)
 
     def push(
@@ -247,7 +247,7 @@ class Derainer(Method):
         self._recent = RecentFrames(self.view.window)
 
     def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
-        """What is odd about a scan for the model, and whether much of it lies outside its grid."""
+        """Warnings about a scan for the model, and whether much of it lies outside its grid."""
         yield from self.spec.issues(judgement.scan)
         yield from outside_view(judgement.scan, judgement.judged, self.spec.data)
 
@@ -299,7 +299,7 @@ class Derainer(Method):
                 self.path,
                 f"its scores of {scan.name or 'a scan'} are not one finite pair for each of "
                 f"{view.size:,} cells",
-                "Export the model again; if others judge the scan neither, look at its values.",
+                "Export the model again; if other models fail on the scan too, check its values.",
             )
 
 

@@ -91,7 +91,7 @@ def search_space(name: str) -> Mapping[str, Span]:
     space = FILTERS[name].SPACE
     if not space:
         raise InputError(
-            name, "it cannot be tuned, for it has no spans to search", "Give its class a SPACE."
+            name, "it cannot be tuned, because it has no spans to search", "Give its class a SPACE."
         )
     return space
 

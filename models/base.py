@@ -94,12 +94,12 @@ class DerainingModule(MeasuredModule):
 
     @property
     def has_spec(self) -> bool:
-        """Whether it has a Spec, from a training or a checkpoint."""
+        """True if it has a Spec, from a training or a checkpoint."""
         return self._spec is not None
 
     @property
     def spec(self) -> Spec:
-        """How the network is used.
+        """The Spec: how the network is used.
 
         Raises:
             InputError: It has none yet, from data or from a checkpoint.
@@ -120,7 +120,7 @@ class DerainingModule(MeasuredModule):
         """
 
     def accepts_view(self, view: View) -> bool:
-        """Whether the network can take what a Spec's view gives: by default, any of its kind."""
+        """True if the network can take what a Spec's view gives: by default, any of its kind."""
         return isinstance(view, self.VIEW)
 
     def rule_for(self, scans: Sequence[Scan]) -> Mapping[str, float]:
@@ -258,7 +258,7 @@ class DerainingModule(MeasuredModule):
             if not hasattr(self, "card"):
                 raise InputError(
                     self.NAME,
-                    "is given batches by no data module, and told nothing of them",
+                    "has no data module, and no task agreed with one",
                     "Call derain.learning.task.agree_on_task(model, data) before.",
                 )
         elif stage == "fit" or self.has_spec:
@@ -286,7 +286,7 @@ class DerainingModule(MeasuredModule):
         elif agreed is not None and self._trainer is not None and not _alike(self.spec, agreed):
             raise InputError(
                 "checkpoint",
-                "it sees another view than the loader makes",
+                "its view differs from that of the loader",
                 "Load the model from it before the loader is made.",
             )
 
@@ -315,5 +315,5 @@ class DerainingModule(MeasuredModule):
 
 
 def _alike(first: Spec, second: Spec) -> bool:
-    """Whether networks of two Specs see the same cells of a scan."""
+    """True if networks of two Specs see the same cells of a scan."""
     return (first.view, first.candidates) == (second.view, second.candidates)

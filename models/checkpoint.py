@@ -63,8 +63,8 @@ def check_resumable(path: Path) -> None:
     if not content.keys() >= TRAINING_STATE:
         raise InputError(
             path,
-            "holds weights alone, no state of a training to go on from",
-            "Go on from the last.ckpt of a run, or train anew without --ckpt_path.",
+            "holds weights alone, without the state of a training to resume",
+            "Resume from the last.ckpt of a run, or train again without --ckpt_path.",
         )
 
 
@@ -212,13 +212,13 @@ def _model_of(content: Mapping[str, Any], path: Path) -> DerainingModule:
         raise InputError(
             path,
             "not a checkpoint of derain",
-            "Published weights become one through `derain import-weights`.",
+            "Convert published weights with `derain import-weights`.",
         )
     spec = Spec.from_dict(parameters["spec"], path)
     if spec.network not in NETWORKS:
         raise InputError(
             path,
-            f"a checkpoint of {shown(spec.network)}, a network that no installed package brings",
+            f"a checkpoint of {shown(spec.network)}, a network that no installed package provides",
             f"{did_you_mean(spec.network, NETWORKS)}Install the package that names it among the "
             f"entry points `{NETWORKS.group}`. Known are {', '.join(NETWORKS)}.",
         )

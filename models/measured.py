@@ -61,7 +61,7 @@ class MeasuredModule(lightning.LightningModule, ABC):
     @property
     @abstractmethod
     def spec(self) -> Spec:
-        """How the network is used."""
+        """The Spec: how the network is used."""
 
     def validation_scans(self, most: int) -> Iterator[Scan]:
         """Reads some of the validation scans, spread over all of them, as they are in their files.

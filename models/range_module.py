@@ -50,7 +50,9 @@ def require_grid(grid: str | None, name: str) -> str:
         InputError: There is none.
     """
     if grid is None:
-        raise InputError(name, "weights do not say what grid they were trained on", "Give --grid.")
+        raise InputError(
+            name, "weights do not record the grid that they were trained on", "Give --grid."
+        )
     return grid
 
 

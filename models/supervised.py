@@ -50,7 +50,7 @@ class SupervisedModule(DerainingModule):
             require_rain(self._sees_rain(), self.card, "the training scans")
 
     def _sees_rain(self) -> bool:
-        """Whether a training scan has rain; those of plain loaders are not read."""
+        """True if a training scan has rain; those of plain loaders are not read."""
         data = self.trainer.datamodule  # type: ignore[attr-defined]
         if not (self.card.rain and isinstance(data, TrainingData)):
             return bool(self.card.rain)

@@ -40,14 +40,14 @@ def make_or_compare(description, make, compare):
 
 
 def points_that_stay(before, after, masks):
-    """Whether the clouds after are those before without their rain, by a title."""
+    """True if the clouds after are those before without their rain, by a title."""
     kept = [points[~rain] for points, rain in zip(before, masks, strict=True)]
     same = len(after) == len(kept) and all(map(np.array_equal, after, kept))
     return {f"{sum(map(len, after)):,} points left of {sum(map(len, masks)):,}": same}
 
 
 def messages_that_stay(before, after, head):
-    """Whether messages are as many, alike in what they begin with, and equal but for the clouds.
+    """True if messages are as many, alike in what they begin with, and equal but for the clouds.
 
     Args:
         before: Messages, whose first member is the topic.

@@ -169,7 +169,7 @@ def attached(path):
 
 
 def is_sound(path):
-    """Whether every checksum, number and place in a file is right."""
+    """True if every checksum, number and place in a file is right."""
     with path.open("rb") as file:
         one_by_one = list(NonSeekingReader(file, validate_crcs=True).iter_messages())
     with path.open("rb") as file:

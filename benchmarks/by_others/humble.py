@@ -167,7 +167,7 @@ def clouds(found):
 
 
 def metadata_is_right(folder, found):
-    """Whether the metadata.yaml has all that ROS 2 asks for, and agrees with the database."""
+    """True if the metadata.yaml has all that ROS 2 asks for, and agrees with the database."""
     content, times = metadata(folder), [time for _, time, _ in found]
     assert content.keys() >= KEYS, KEYS - content.keys()
     counts = {}

@@ -37,7 +37,7 @@ class Reader:
         return self.seeds()
 
     def must_read(self, number: int) -> bool:
-        """Whether an input is undamaged."""
+        """True if an input is undamaged."""
         return number < len(self._seeds)
 
     def content(self, seed: int, number: int) -> bytes:

@@ -46,7 +46,7 @@ class Outcome:
 
     @property
     def is_finding(self) -> bool:
-        """Whether something is wrong."""
+        """True if something is wrong."""
         return self.verdict not in (RIGHT, REFUSED)
 
 
@@ -162,7 +162,7 @@ def _serve(connection: Connection, seed: int, folder: Path, readers: Readers) ->
 
 @cache
 def _has_peaks() -> bool:
-    """Whether the system says how much a process had at most, and can be told to forget it."""
+    """True if the system says how much a process had at most, and can be told to forget it."""
     return os.access("/proc/self/clear_refs", os.W_OK)
 
 

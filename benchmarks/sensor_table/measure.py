@@ -108,7 +108,7 @@ class Measurement:
         yield Column(title, "IoU", cells, about)
 
     def _learnt(self, row: BenchEntry, column: str, found: LabelledFrames) -> bool:
-        """Whether a method was trained on scans of a column, by its record or by the plan."""
+        """True if a method was trained on scans of a column, by its record or by the plan."""
         spec = row.spec_or_filter
         recorded = isinstance(spec, Spec) and training_overlap(
             row.title, spec, found.card, found.frames

@@ -28,7 +28,7 @@ class Row:
 
     @property
     def is_position(self) -> bool:
-        """Whether it is learnt anew for each column, from other scans of the same data."""
+        """True if it is learnt anew for each column, from other scans of the same data."""
         return self.method == "position"
 
 

@@ -192,7 +192,7 @@ def parts_of(frames: Sequence[Frame]) -> Iterator[TaughtPart]:
 
 
 def is_taught(root: Path) -> bool:
-    """Whether a folder holds taught labels, complete or not."""
+    """True if a folder holds taught labels, complete or not."""
     path, head = root / TAUGHT_MANIFEST, f"made_by: {TEACHING}\n".encode()
     if not is_file(path):
         return False
@@ -206,7 +206,7 @@ def label_path(root: Path, key: str) -> Path:
 
 
 def _is_later(frame: Frame, other: Frame) -> bool:
-    """Whether a frame is later in the same sequence; two sequences may have one name."""
+    """True if a frame is later in the same sequence; two sequences may have one name."""
     return frame.sequence == other.sequence and frame.number > other.number
 
 

@@ -115,7 +115,7 @@ class PointCloud:
 
     @property
     def is_organised(self) -> bool:
-        """Whether its rows are rows of the sensor."""
+        """True if its rows are rows of the sensor."""
         return self.height > 1
 
     def columns(self) -> dict[str, NDArray[Any]]:

@@ -108,7 +108,7 @@ def _unpack_file(source: Path, target: Path) -> None:
                 while portion := reader.read(PORTION):
                     if shutil.disk_usage(target.parent).free < LEFT + len(portion):
                         raise ValueError(
-                            f"{source.name} unpacks to more than there is room for in "
+                            f"{source.name} unpacks to more than the free space in "
                             f"{target.parent.parent}"
                         )
                     unpacked.write(portion)

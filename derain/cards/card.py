@@ -1,4 +1,4 @@
-"""Data cards: what must be known of a data set to train on it and to use what was trained."""
+"""Data cards: descriptions of data sets, for training on them and for using trained models."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -26,7 +26,7 @@ CHANNELS_OF_STATISTICS = ("x", "y", "z", "intensity")
 
 @dataclass(frozen=True)
 class DataCard:
-    """What must be known of a data set.
+    """The description of a data set.
 
     Example:
         >>> card = DataCard("my garage", classes={0: "wall", 1: "spray"}, rain=(1,))
@@ -116,7 +116,7 @@ class DataCard:
         return self.intensity_unit if channel == "intensity" else UNITS.get(channel, "not stated")
 
     def rain_of(self, scan: Scan) -> NDArray[np.bool_]:
-        """Which points of a labelled scan are rain, bool (N,).
+        """True for points of a labelled scan that are rain, bool (N,).
 
         Raises:
             InputError: A scan without labels.
@@ -124,7 +124,7 @@ class DataCard:
         return self._of_classes(scan, self.rain)
 
     def unknown_of(self, scan: Scan) -> NDArray[np.bool_]:
-        """Of which points of a labelled scan it is not known whether they are rain, bool (N,).
+        """True for points of a labelled scan whose class is unknown, bool (N,).
 
         Raises:
             InputError: A scan without labels.
@@ -132,7 +132,7 @@ class DataCard:
         return self._of_classes(scan, self.unknown)
 
     def known_points(self, scan: Scan) -> tuple[Scan, NDArray[np.bool_]]:
-        """The points of a labelled scan of which it is known whether they are rain.
+        """The points of a labelled scan whose class is known.
 
         Returns:
             The scan of those M points, and which of them are rain, bool (M,).
@@ -228,7 +228,7 @@ def _card(document: Entry) -> DataCard:
             raise members[key].fault(
                 f"{shown(list(ids))} are not all ids of classes"
                 f"{' that are not rain' if key == 'unknown' else ''}",
-                "Name ids that stand under classes.",
+                "Name ids that are listed under classes.",
             )
     return card
 

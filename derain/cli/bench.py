@@ -142,7 +142,7 @@ def main(arguments: argparse.Namespace) -> int:
         with executor_of(arguments, workers) as executor:
             counted = count_in_units(methods, chosen, arguments.threads, out, division, executor)
         if counted is None:
-            print_lines(f"How far the other shards are: derain status {out}")
+            print_lines(f"Progress of the other shards: derain status {out}")
             return None
         found = run_bench(methods, chosen, effort, command, counted)
         found.write(out)
@@ -155,7 +155,7 @@ def main(arguments: argparse.Namespace) -> int:
         return 0
     if not data.has_parts:
         raise InputError(
-            arguments.data[0], "has no split, which the paper's tables ask for", "Name the root."
+            arguments.data[0], "has no split, which the paper's tables need", "Name the root."
         )
     table = paper_table(arguments.paper)
     groups = scans_by_group(table, partial(_frames, data), lambda frame: rates.get(frame.sequence))

@@ -24,18 +24,17 @@ from derain.system.extras import CHECKPOINT_LIBRARIES, require
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
-    parser.add_argument("network", help="the network that they are weights of, such as outdet")
+    parser.add_argument("network", help="network of the weights, such as outdet")
     parser.add_argument("weights", type=Path, help="the published state_dict or checkpoint")
     parser.add_argument(
         "--stats",
         required=True,
         help="data card with their mean and std: wads, kitti, semantickitti, spray, or a YAML file",
     )
+    parser.add_argument("--data", help="data card of the training data (default: that of --stats)")
     parser.add_argument(
-        "--data", help="data card of what they were trained on (default: that of --stats)"
-    )
-    parser.add_argument(
-        "--grid", help="of a range image, where they see one: semantickitti, rehearse3d or wads"
+        "--grid",
+        help="grid of the range image, if the network uses one: semantickitti, rehearse3d or wads",
     )
     parser.add_argument(
         "--out", type=file_named(".ckpt"), required=True, help="the checkpoint to write"

@@ -158,8 +158,8 @@ def _describe_default(as_json: bool) -> None:
     if os.path.exists(DEFAULT):
         raise InputError(
             DEFAULT,
-            "it is the model that comes with derain, and a file or folder here has its name",
-            f"Write ./{DEFAULT} for that, or ask from another folder.",
+            "it names the model that comes with derain, and also a file or folder here",
+            f"Write ./{DEFAULT} for the file or folder, or run the command in another folder.",
         )
     model, card = default_model(), model_card()
     if as_json:
@@ -183,7 +183,7 @@ def _describe_folder(folder: Path, arguments: argparse.Namespace) -> None:
             executor,
         )
     if facts is None:
-        print_lines(f"How far the other shards are: derain status {arguments.out}")
+        print_lines(f"Progress of the other shards: derain status {arguments.out}")
         return
     print_lines(json.dumps(facts.as_dict()) if arguments.json else facts.as_text())
     if arguments.card is not None and not facts.total.labelled:

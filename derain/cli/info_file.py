@@ -65,7 +65,7 @@ def facts_of_file(path: Path, card_name: str | None, columns: Sequence[str]) -> 
         case ".pt" | ".pth":
             raise InputError(
                 path,
-                "weights alone do not say how they are used",
+                "holds weights without the Spec of their use",
                 "Make a checkpoint of them with `derain import-weights`.",
             )
         case _:
@@ -158,7 +158,7 @@ def _of_bag(path: Path) -> dict[str, Any]:
     topics, clouds = {}, {}
     for topic in bag.topics:
         decoder = decoder_of(topic.type)
-        needs = "" if decoder is None else f"; no point clouds before {decoder} makes them"
+        needs = "" if decoder is None else f"; {decoder} turns it into point clouds"
         topics[topic.name] = f"{topic.type or 'no type'}, {topic.messages:,} messages{needs}"
         if topic.type == POINT_CLOUD and topic.messages:
             clouds[topic.name] = _of_clouds(CloudTopic(bag, topic))

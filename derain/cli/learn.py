@@ -46,13 +46,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=file_named(".onnx"), required=True, help="the ONNX file to write"
     )
-    parser.add_argument("--model", choices=STUDENTS, help="(default: that of --start)")
+    parser.add_argument(
+        "--model", choices=STUDENTS, help="network to train (default: that of --start)"
+    )
     parser.add_argument("--start", metavar="MODEL", help=START_HELP)
     parser.add_argument(
         "--teacher",
         default=DEFAULT,
         metavar="METHOD",
-        help="what labels the scans: the model that comes with derain (%(default)s), persistence, "
+        help="method that labels the scans: the model that comes with derain (%(default)s), persistence, "
         "a filter such as crf, or a model of yours (.onnx)",
     )
     add_poses(parser)
@@ -62,7 +64,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="learn without intensity: for sensors of other units, or where it is of no use",
     )
-    parser.add_argument("--work", type=Path, help="folder for all else (default: beside the model)")
+    parser.add_argument(
+        "--work", type=Path, help="folder for everything else (default: beside the model)"
+    )
     parser.add_argument(
         "--card",
         help="data card of labels beside the scans, which measure the finished model for the "

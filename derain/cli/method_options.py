@@ -139,7 +139,7 @@ def add_method_and_scans(parser: Parser, help: str) -> None:
     )
     list_methods(parser)
     add_threads(parser)
-    add_runtime(parser, help="what runs the model")
+    add_runtime(parser, help="runtime of the model")
     parser.add_argument(
         "--parameters", type=Path, metavar="YAML", help="parameters of the method, from derain tune"
     )
@@ -194,7 +194,7 @@ def method_and_scans(
     if there and not of_method:
         raise InputError(
             first,
-            "it is a method's name, and a file or folder here has it, too",
+            "it names a method, and also a file or folder here",
             f"Write ./{first} to have that judged by the model that comes with derain, or "
             f"{beside} to have others judged by the method.",
         )

@@ -61,7 +61,7 @@ class Parser(argparse.ArgumentParser):
         Args:
             options: Each by one of its names.
         """
-        text = "show all options, and what there is to know of them"
+        text = "show all options, with full explanations"
         self.add_argument(HELP_ALL, action=_HelpAll, nargs=0, help=text)
         self._whole_description = self.description
         self.description = _first_examples(self.description or "")

@@ -185,13 +185,13 @@ def main(arguments: argparse.Namespace) -> int:
     with executor_of(arguments, arguments.workers or usable_cores()) as executor:
         complete = simulate_track(arguments.out, campaign, executor, shard_of(arguments))
     if not complete:
-        outputs.print_lines(f"How far the other shards are: derain status {arguments.out}")
+        outputs.print_lines(f"Progress of the other shards: derain status {arguments.out}")
         return 0
     sequences = len(campaign.names)
     scans = sequences * (1 if in_world else arguments.scans)
     outputs.print_lines(
         f"{arguments.out}: {sequences} sequences, {scans:,} scans. "
-        f"What is in them: derain info {arguments.out}"
+        f"To describe them: derain info {arguments.out}"
     )
     return 0
 
@@ -200,7 +200,7 @@ def _refuse(foreign: Iterable[str], arguments: argparse.Namespace, needs: str) -
     """Refuses the options of other uses."""
     for name in foreign:
         if getattr(arguments, name) is not None:
-            raise InputError(f"--{name}", f"has a meaning only {needs}", "Leave it out.")
+            raise InputError(f"--{name}", f"works only {needs}", "Leave it out.")
 
 
 def _campaign(options: argparse.Namespace) -> "Campaign | WorldCampaign":
@@ -235,7 +235,7 @@ def _rain_on_scans(arguments: argparse.Namespace) -> int:
     from derain.simulation.sensor import load_sensor
 
     if not arguments.rain or len(arguments.rain) > 1:
-        raise InputError("--rain", "it rains on scans at one rate", "Give one, e.g. --rain 25.")
+        raise InputError("--rain", "scans take a single rain rate", "Give one, e.g. --rain 25.")
     rain, sensor = UniformRain(*arguments.rain), load_sensor(arguments.sensor or "spinning_64")
     source = named_frames(arguments.on, arguments.columns or DEFAULT_COLUMNS)
     sink = outputs.folder_sink(arguments.out, source)
@@ -255,7 +255,7 @@ def _rain_on_scans(arguments: argparse.Namespace) -> int:
                     save(figure, sink.path(frame, ".png"))
                 written += 1
                 _print_rain(frame.name, clean, rainy, int(drops.sum()), arguments.json)
-    return outputs.exit_code(len(failures.errors), len(source), "it could not rain on {scans}")
+    return outputs.exit_code(len(failures.errors), len(source), "no rain could be added to {scans}")
 
 
 def _print_rain(name: str, clean: "Scan", rainy: "Scan", drops: int, as_json: bool) -> None:

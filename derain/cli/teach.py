@@ -120,7 +120,7 @@ def main(arguments: argparse.Namespace) -> int:
             stream,
         )
     if not results.manifest.finished:
-        print_lines(f"How far the other shards are: derain status {arguments.out}", stream)
+        print_lines(f"Progress of the other shards: derain status {arguments.out}", stream)
     failed = len(failures.errors)
     return exit_code(failed, len(source), "{scans} could not be judged, and have no labels")
 

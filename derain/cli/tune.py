@@ -98,7 +98,7 @@ def main(arguments: argparse.Namespace) -> int:
         candidates = None
         if arguments.candidates is not None:
             candidates = bounds_of_rain(data, drawn, arguments.candidates)
-            every = "every point, for no bounds separate rain from the rest"
+            every = "every point: no bounds separate rain from the rest"
             print_lines(f"candidates: {candidates or every}")
         tuned = tune_filter_on(
             method,

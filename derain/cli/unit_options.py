@@ -46,14 +46,14 @@ def add_units(
         f"runs of more than {BLOCK} scans keep)",
     )
     group.add_argument(
-        "--anew", action="store_true", help="do everything again, also with other options"
+        "--anew", action="store_true", help="do everything again, even with other options"
     )
     group.add_argument(
         "--block",
         type=count,
         default=BLOCK,
         metavar="SCANS",
-        help="scans of a unit of a long recording (default: %(default)s)",
+        help="scans per unit of a long recording (default: %(default)s)",
     )
 
 
@@ -78,7 +78,7 @@ def add_shard(group: "argparse._ArgumentGroup") -> None:
         "--shard",
         type=shard,
         metavar="I/N",
-        help="do shard I of N, from 0 on (default: by SLURM_ARRAY_TASK_ID, where there is one)",
+        help="process shard I of N, from 0 on (default: from SLURM_ARRAY_TASK_ID, if set)",
     )
 
 
@@ -96,7 +96,10 @@ def shard_of(arguments: argparse.Namespace) -> Shard | None:
     """The shard of the work that is done, of which it warns where nobody asked; None for all."""
     found: Shard | None = arguments.shard or Shard.of_environment()
     if found is not None and found.of_array:
-        warn(f"{TASK} is {found.number + found.first}: one shard is done; --shard 0/1 does all")
+        warn(
+            f"{TASK} is {found.number + found.first}: "
+            "only one shard is processed; --shard 0/1 processes all"
+        )
     return found
 
 

@@ -129,7 +129,7 @@ def weather_table(path: Path | None) -> Iterator[list[Sequence[object]]]:
         with reading(path), path.open("rb") as file:
             start = file.read(len(FIRST_COLUMNS))
         if start not in (FIRST_COLUMNS, b""):
-            reason = "is there already, and no table of the weather"
+            reason = "exists, and is not a table of the weather"
             raise InputError(path, reason, "Give --weather another file.")
     require_writable(path)
     try:

@@ -1,4 +1,4 @@
-"""The model that comes with derain: its file, its card, and whether the one is the other's."""
+"""The model that comes with derain: its file, its card, and the check that they belong together."""
 
 import re
 from collections.abc import Callable
@@ -26,7 +26,7 @@ LARGEST_SEED = 2**32 - 1
 
 @dataclass(frozen=True)
 class ModelScore:
-    """How a model does on some data.
+    """Scores of a model on one data set.
 
     Attributes:
         data: Name of the data, with a word where their rain is simulated.
@@ -46,7 +46,7 @@ class ModelScore:
 
     @classmethod
     def at(cls, entry: Entry) -> Self:
-        """The score that stands somewhere in a document.
+        """Reads a score from a document.
 
         Raises:
             InputError: Something that is none.
@@ -57,7 +57,7 @@ class ModelScore:
 
 @dataclass(frozen=True)
 class ModelCard:
-    """What must be known of a model that is handed out.
+    """The card of a published model: its origin, scores and limits.
 
     Source: the idea and the headings, M. Mitchell et al., "Model Cards for Model Reporting",
     FAT* 2019.
@@ -106,7 +106,7 @@ class ModelCard:
 
     @property
     def title(self) -> str:
-        """Name, version and the beginning of the checksum: enough to know it again by."""
+        """Name, version and the beginning of the checksum: enough to identify it."""
         return f"{self.name}, version {self.version} (sha256 {self.sha256[:12]})"
 
     def as_dict(self) -> dict[str, Any]:

@@ -101,7 +101,7 @@ class Answers:
 
     @property
     def rain_among_known(self) -> float:
-        """Share of rain among the points of which the teacher is sure; NaN where there are none."""
+        """Share of rain among the points that the teacher is sure of; NaN if there are none."""
         not_rain, rain, _ = self.table.sum(axis=(0, 2))
         return float(ratio(rain, not_rain + rain))
 

@@ -62,7 +62,7 @@ def or_example(path: Path) -> Path:
 
 @dataclass
 class Truth:
-    """What of the rain of the example was found, by its labels.
+    """How much of the example's rain was found, by its labels.
 
     Attributes:
         rain: Points that are rain or snow.

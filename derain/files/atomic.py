@@ -174,7 +174,7 @@ def remove_abandoned(folder: Path) -> None:
 
 
 def lock(descriptor: int, *, wait: bool, shared: bool = False) -> bool:
-    """Locks an open file or folder, until it is closed, against all others that ask in this way.
+    """Locks an open file or folder, until it is closed, against all others that lock it here.
 
     Args:
         descriptor: The file or the folder.

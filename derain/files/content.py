@@ -50,7 +50,7 @@ class MemoryBudget:
 
 @dataclass(frozen=True)
 class Content:
-    """What a scan file holds.
+    """The content of a scan file.
 
     Attributes:
         path: The file.

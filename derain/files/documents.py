@@ -41,7 +41,7 @@ _SAFE_LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 class _Loader(_SAFE_LOADER):  # type: ignore[misc]
-    """Refuses a mapping that has a key twice, of which YAML's own takes the last."""
+    """Refuses a mapping with a key twice; YAML's own loader takes the last."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> Any:
         keys = set()
@@ -80,7 +80,7 @@ _SHORT.maxlevel, _SHORT.maxstring, _SHORT.maxother = 2, 60, 60
 
 @dataclass(frozen=True)
 class Entry:
-    """A value of a document that knows its place, so that an error can name it.
+    """A value of a document with its place, so that an error can name it.
 
     Every method raises InputError for a value of another kind than it reads; the message has the
     document and the key.
@@ -119,7 +119,7 @@ class Entry:
 
     @classmethod
     def of_json(cls, text: str, source: Path | str, largest: int = LARGEST_DOCUMENT) -> "Entry":
-        """A JSON document that stands in something else, such as the metadata of a model.
+        """Reads a JSON document inside another file, such as the metadata of a model.
 
         Args:
             text: The document.
@@ -164,7 +164,7 @@ class Entry:
         }
 
     def each(self, read: Callable[["Entry"], Parsed]) -> dict[str, Parsed]:
-        """What a function reads of each value of a mapping, by key."""
+        """Parses each value of a mapping; returns the results by key."""
         return {key: read(entry) for key, entry in self.members().items()}
 
     def numbered(self, least: int, most: int) -> dict[int, "Entry"]:
@@ -181,7 +181,7 @@ class Entry:
     def record(
         self, parsers: Mapping[str, Callable[["Entry"], Any]], required: Collection[str] = ()
     ) -> dict[str, Any]:
-        """What is in a mapping whose keys are known.
+        """Parses a mapping with known keys.
 
         Args:
             parsers: What reads the value, by key.

@@ -1,4 +1,4 @@
-"""Where a sensor is mounted: what takes its points into another sensor's frame."""
+"""The mounting of a sensor: the transform of its points into another sensor's frame."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a format of scan files is, and all that there are."""
+"""The base class of formats of scan files, and their registry."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -68,7 +68,7 @@ class Format(ABC):
         """
 
     def names_columns(self, scan: Scan) -> bool:
-        """Whether a file that a scan is written to names its columns.
+        """True if a file that a scan is written to names its columns.
 
         A further column in one that does not would be taken for something else by who reads it.
         """

@@ -47,7 +47,7 @@ def reading(path: Path, *damage: type[Exception]) -> Iterator[None]:
         ) from error
     except MemoryError as error:
         raise InputError(
-            path, "needs more memory than there is", "Cut it into smaller scans."
+            path, "needs more memory than is available", "Cut it into smaller scans."
         ) from error
 
 
@@ -97,7 +97,7 @@ def stamp_of(path: Path) -> str:
 
 
 def is_file(path: Path) -> bool:
-    """Whether there is such a file.
+    """True if there is such a file.
 
     Raises:
         InputError: That cannot be known: a name longer than any file's, or a folder that may not be

@@ -1,4 +1,4 @@
-"""What formats with a text header share: names in any encoding, and points as lines of numbers."""
+"""Shared parts of formats with a text header: names in any encoding, points as lines of numbers."""
 
 import io
 import math

@@ -1,4 +1,4 @@
-"""What is known of a scan's rain before any point is judged: how bright it is, and how far."""
+"""Estimates of a scan's rain before any point is judged: its brightness and its range."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -118,7 +118,7 @@ def _is_airborne(
     neighbourhoods: tuple[NDArray[np.int64], NDArray[np.float32]],
     sparseness: float,
 ) -> NDArray[np.bool_]:
-    """Which neighbourhoods are scattered through space and sparse, bool (Q,)."""
+    """True for neighbourhoods that are scattered through space and sparse, bool (Q,)."""
     neighbours, distances = neighbourhoods
     spacing = distances.T.astype(np.float64).mean(axis=0) / distance
     sparse = spacing > sparseness * np.median(spacing)

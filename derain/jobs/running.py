@@ -41,7 +41,7 @@ class Submits(Protocol):
 
 
 class Result(Protocol):
-    """What came of a unit, or of a part of it."""
+    """The result of a unit, or of a part of it."""
 
     @property
     def error(self) -> InputError | None:
@@ -59,7 +59,7 @@ IsThere = Callable[[UnitT, list[ResultT]], bool]
 
 
 class Work(ABC, Generic[UnitT, ResultT]):
-    """What is done of each unit. It is pickled once a job, and each thread keeps its last one."""
+    """The work for each unit. It is pickled once per job, and each thread keeps its last one."""
 
     @abstractmethod
     def do(self, unit: UnitT) -> Iterator[ResultT]:
@@ -132,7 +132,7 @@ class ValueWork(Work[UnitT, Value]):
 
 @dataclass(frozen=True)
 class Task(Generic[UnitT, ResultT]):
-    """What a process does of the units of a job, with a record of each.
+    """The part of a job that one process does, with a record of each unit.
 
     Attributes:
         job: The job; None keeps no records.
@@ -312,7 +312,7 @@ def values(
         raise InputError(
             failures[0].subject,
             f"{failures[0].reason}, so that {len(failures):,} of {len(shard):,} {unit}s failed",
-            f"{failures[0].remedy} The same command goes on with them.",
+            f"{failures[0].remedy} The same command retries them.",
         )
     if len(shard) == len(units):
         return found
@@ -355,7 +355,7 @@ def _awaited(task: Task[UnitT, ResultT], unit: UnitT, future: Any) -> Sequence[R
         raise InputError(
             "executor",
             f"it ended before {unit.id} was done ({error or type(error).__name__})",
-            "Run the same command again: it goes on with what is not done.",
+            "Run the same command again: it does the remaining units.",
         ) from error
     except UnfitWorkerError:
         raise

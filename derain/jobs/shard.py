@@ -49,7 +49,7 @@ class Shard:
 
     @classmethod
     def of_text(cls, text: str) -> Self:
-        """The shard that ``I/N`` names, the first of which is 0/N.
+        """Parses ``I/N``; the first shard is 0/N.
 
         Raises:
             ValueError: Other text.

@@ -24,7 +24,7 @@ class Unit:
 
 @dataclass(frozen=True)
 class Record:
-    """What was done of a unit.
+    """The record of a unit's work.
 
     Attributes:
         unit: Id of the unit.
@@ -48,5 +48,5 @@ class Record:
 
     @property
     def failures(self) -> list[InputError]:
-        """What went wrong."""
+        """The failures of the unit."""
         return [InputError(*error) for error in self.errors]

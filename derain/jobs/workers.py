@@ -96,7 +96,7 @@ class WorkerPool(ThreadPoolExecutor):
         raise InputError(
             "worker",
             f"its process died {TRIES} times",
-            "See whether memory is full; fewer --workers need less.",
+            "Check whether the memory is full; fewer --workers need less.",
         )
 
 
@@ -109,7 +109,7 @@ class _Worker:
         self._connection: Connection[Any, Any] | None = None
 
     def ask(self, task: bytes) -> tuple[bool, Any]:
-        """Has the process do something.
+        """Sends a task to the process, and waits for its answer.
 
         Args:
             task: What to call, its arguments and those with names, pickled.
@@ -147,7 +147,7 @@ class _Worker:
 
 
 def _serve(connection: "Connection[Any, Any]") -> None:
-    """Does what it is asked for until its process is killed."""
+    """Runs tasks until its process is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal: whoever began this ends it
     end_with_parent()
     keep_freed_memory()

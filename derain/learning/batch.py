@@ -53,7 +53,7 @@ class Sample:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredScan:
-    """What is needed of a scan once the network has scored it.
+    """The data of a scan that are needed after the network has scored it.
 
     Attributes:
         scan: The whole scan, with its labels where they are known.

@@ -29,7 +29,7 @@ LEAST_PROBABILITY = 0.01
 # Names of the palette's colours.
 COLOUR_NAMES = dict(zip(palette.OUTCOMES.values(), ("grey", "blue", "yellow", "red"), strict=True))
 
-PROBABILITY_TEXT = "Probability of rain: dark, blue, white, ever higher"
+PROBABILITY_TEXT = "Probability of rain: from dark (low) over blue to white (high)"
 
 
 def write_playback(
@@ -251,9 +251,9 @@ def caption(frame: Frame, scan: Scan, labels: Labels | None, held_out: bool) -> 
 
 def _known_by(labels: Labels | None) -> str:
     if labels is None:
-        return "No labels: which points are rain is not known."
+        return "No labels: the true rain is unknown."
     if not labels.card.unknown:
-        return f"Rain is what the {labels.name} calls rain."
+        return f"Rain means rain by the {labels.name}."
     return (
         f"Rain is what the {labels.name} calls rain; in its own view, yellow is what it does not "
         "know."

@@ -1,4 +1,4 @@
-"""How the viewer shows a recording: scans side by side by method, range images, curves."""
+"""The layout of a recording in the viewer: scans side by side by method, range images, curves."""
 
 from collections.abc import Mapping, Sequence
 

@@ -20,7 +20,7 @@ PIPE_BLOCK = 1 << 20
 
 
 class RecordingFile:
-    """What Rerun logs, on its way to a file.
+    """A file that receives Rerun's log.
 
     Attributes:
         stream: Rerun's stream.

@@ -1,4 +1,4 @@
-"""Where a sensor was, scan by scan, from nothing but its scans.
+"""Poses of a sensor, scan by scan, from its scans alone.
 
 A registration is trusted where the scans fit, and where a vehicle could have driven so.
 """
@@ -52,7 +52,7 @@ NO_POINTS = Scan.of(np.zeros((0, 3), np.float32))
 
 @dataclass(frozen=True, eq=False)
 class Registration:
-    """Where a scan was taken, by the scan before it.
+    """The pose of a scan, relative to the scan before it.
 
     Attributes:
         motion: Takes this scan's frame to that of the scan before, float64 (4, 4), metres; the
@@ -76,7 +76,7 @@ class Registration:
 
     @property
     def distance(self) -> float:
-        """How far the sensor moved, metres."""
+        """Distance that the sensor moved, metres."""
         return shift_of(self.motion)
 
     @property
@@ -87,7 +87,7 @@ class Registration:
     def issues(self) -> Iterator[ScanIssue]:
         """Says so where it is not to be trusted."""
         if not self.trusted:
-            detail = f"where it was taken is not known: {self.reason}"
+            detail = f"its pose is not known: {self.reason}"
             yield ScanIssue("its place is not known", detail)
 
 
@@ -113,7 +113,7 @@ def turn_of(motion: NDArray[np.float64]) -> float:
 
 
 class Trust:
-    """What the scans of a sequence were like so far, and whether the next one is like them."""
+    """Statistics of a sequence so far, and the check that the next scan fits them."""
 
     def __init__(self) -> None:
         self._residuals: list[float] = []
@@ -136,10 +136,8 @@ class Trust:
                 f"{most:.3f} m is the most"
             )
         if fit.facing < LEAST_FACING:
-            return (
-                "too little stands across some direction to tell how far the sensor went along it"
-            )
-        return "" if fit.converged else "the search for the motion did not come to rest"
+            return "too few surfaces face some direction to measure the motion along it"
+        return "" if fit.converged else "the search for the motion did not converge"
 
     def unlikely(self, motion: NDArray[np.float64]) -> str:
         """Why no vehicle moves so between two scans; empty where one may.
@@ -252,7 +250,7 @@ class Odometry:
         return surfaces.onto(before, afar.motion, WITHIN)
 
     def _going_on(self, fit: Fit | None, reason: str) -> Registration:
-        """Where the sensor would be if it had gone on as it did."""
+        """The pose extrapolated at constant velocity."""
         return self._moved(np.eye(4) if self._expected is None else self._expected, fit, reason)
 
     def _moved(self, motion: NDArray[np.float64], fit: Fit | None, reason: str) -> Registration:
@@ -262,7 +260,7 @@ class Odometry:
 
 
 class FrameOdometry:
-    """Odometry of frame after frame, which starts anew with each recording.
+    """Odometry of frame after frame, which starts again with each recording.
 
     Args:
         threads: Threads to use; 0 takes every core this process may use.

@@ -1,4 +1,4 @@
-"""Frames with poses: of a file, of a sensor that stands, or found by odometry."""
+"""Frames with poses: from a file, of a sensor at rest, or computed by odometry."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""What a method of recordings is, and all that there are."""
+"""The base class of methods of recordings, and their registry."""
 
 from abc import abstractmethod
 from collections.abc import Mapping

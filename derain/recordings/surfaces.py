@@ -41,7 +41,7 @@ FEWEST_SURFACES = 200
 
 @dataclass(frozen=True)
 class Fit:
-    """How well one scan's surfaces lie on another's.
+    """The fit of one scan's surfaces to another's.
 
     Attributes:
         motion: Takes the first one's frame to that of the other, float64 (4, 4), metres.
@@ -86,7 +86,7 @@ class Surfaces:
 
     @property
     def are_enough(self) -> bool:
-        """Whether anything can be laid upon them."""
+        """True if anything can be laid upon them."""
         return len(self) >= FEWEST_SURFACES
 
     def onto(self, other: "Surfaces", start: NDArray[np.float64], within: float) -> Fit:

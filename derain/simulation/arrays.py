@@ -30,7 +30,7 @@ class Columns:
 
 @dataclass(frozen=True, eq=False)
 class Returns(Columns):
-    """What comes back to the sensor, ordered by beam.
+    """Returns to the sensor, ordered by beam.
 
     Every beam has a row, also one that nothing returned; a sensor of dual returns may give it two,
     the strongest first.

@@ -45,7 +45,7 @@ LONGEST = 2000.0
 
 @dataclass(frozen=True)
 class Drive:
-    """A drive along a street, or a stand in it while others move.
+    """A drive along a street, or a sensor at rest in it while others move.
 
     Attributes:
         speed: Speed of the sensor along the street, m/s; 0 stands.
@@ -249,7 +249,7 @@ class Campaign(SplitSequences):
 
     @property
     def times(self) -> Floats:
-        """When the scans of a sequence are taken, float64 (scans,), seconds from 0 on."""
+        """Time at which the scans of a sequence are taken, float64 (scans,), seconds from 0 on."""
         return np.arange(self.scans) / self.lidar.frame_rate
 
     @property

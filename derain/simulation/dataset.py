@@ -125,7 +125,7 @@ class SequenceWork(ValueWork[Unit]):
         return checksums(folder, self.root)
 
     def look(self) -> IsThere[Unit, Value]:
-        """Whether a sequence is there."""
+        """True if a sequence is there."""
         return lambda unit, values: (self.root / SEQUENCES / unit.id).is_dir()
 
 

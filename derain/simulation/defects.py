@@ -23,7 +23,7 @@ SMALLEST_GAP = 0.3
 
 @dataclass(frozen=True)
 class Defects(Settings):
-    """What is wrong with the scans of a sensor; the default is nothing.
+    """The defects of a sensor's scans; none by default.
 
     Attributes:
         SUBJECT = "defects"
@@ -80,7 +80,7 @@ class Defects(Settings):
         return _with_both(merged, row[apart], returns.take(beside[apart]), share[apart])
 
     def received(self, returns: Returns, shape: tuple[int, int], generator: Generator) -> Bools:
-        """Which returns are not lost, bool (N,).
+        """True for returns that are not lost, bool (N,).
 
         Args:
             returns: What the sensor detects.
@@ -116,7 +116,7 @@ class Defects(Settings):
 
 
 def _single(beam: Ints) -> Bools:
-    """Whether each row is the only one of its beam, bool (N,), beams ascending."""
+    """True if each row is the only one of its beam, bool (N,), beams ascending."""
     changes = np.diff(beam, prepend=-1, append=-1) != 0
     return np.asarray(changes[1:] & changes[:-1])
 

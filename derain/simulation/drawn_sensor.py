@@ -34,7 +34,7 @@ class Spans(Settings):
 
 @dataclass(frozen=True)
 class DefectSpans(Spans):
-    """What the defects of sensors are drawn from; shares are drawn evenly.
+    """The ranges that defects of sensors are drawn from; shares are drawn evenly.
 
     Attributes:
         SUBJECT = "defect spans"
@@ -63,7 +63,7 @@ class DefectSpans(Spans):
 
 @dataclass(frozen=True)
 class SensorSpans(Spans):
-    """What sensors are drawn from. The defaults span the sensors of today.
+    """The ranges that sensors are drawn from. The defaults span the sensors of today.
 
     Angles are in degrees, distances in metres. Spans of a decade or more are
     log-uniform where stated, the others uniform.

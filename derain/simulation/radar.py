@@ -247,7 +247,7 @@ def volume_reflectivity(rate: Floats) -> Floats:
 
 
 def _threshold(echo: Floats, false_alarm_rate: float) -> Floats:
-    """What the echo of a cell must exceed: a multiple of the mean of its reference cells.
+    """The threshold of a cell's echo: a multiple of the mean of its reference cells.
 
     Source: Finn and Johnson 1968, "Adaptive detection mode with threshold control as a function of
     spatially sampled clutter-level estimates" (cell-averaging CFAR).

@@ -43,7 +43,7 @@ STRONGEST_WIND = 2.0
 
 
 def weather_record(nominal: float, at_sensor: float, wind: Place) -> dict[str, float]:
-    """What a weather station and a disdrometer would measure of some rain.
+    """The record of a weather station and a disdrometer in some rain.
 
     The drop spectrum N(D) = intercept · exp(−slope · D), the median diameter by volume and the
     visibility are those of the nominal rate. Clear air has an infinite slope, drops of no diameter,
@@ -114,7 +114,7 @@ class SimulatedScene:
         return cls(track, rain, weather, course, traffic, drive.skew)
 
     def cast(self, sensor: Sensor, times: Floats) -> Iterator[Returns]:
-        """What every beam of a sensor would return through clear air, scan after scan.
+        """The return of every beam of a sensor through clear air, scan after scan.
 
         Args:
             sensor: The sensor.
@@ -141,7 +141,7 @@ class SimulatedScene:
             yield seen
 
     def _moments(self, course: Course, time: float, sensor: Sensor) -> tuple[Floats, Floats]:
-        """When the beams of a scan are sent, and the sensor's pose then: of all at once, or each.
+        """Times of the beams of a scan, and the sensor's pose then: of all at once, or each.
 
         Returns:
             Seconds, float64 () or (N,); and poses, float64 (4, 4) or (N, 4, 4).

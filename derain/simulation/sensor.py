@@ -203,7 +203,7 @@ class Sensor(Settings):
         return self.aperture + self.beam_spread * range
 
     def detected(self, clear: Returns, transmission: Floats) -> Returns:
-        """What the sensor would see of the surfaces if there were no particles in front of them.
+        """The detected returns of surfaces without any particles in front of them.
 
         Args:
             clear: What each beam would return through clear air to a perfect detector.
@@ -220,7 +220,7 @@ class Sensor(Settings):
         )
 
     def reported(self, candidates: Returns) -> Returns:
-        """What the sensor reports of all that it could detect.
+        """The returns that the sensor reports, out of all that it could detect.
 
         Args:
             candidates: At least one row for every beam; of a beam that nothing returned one without

@@ -1,4 +1,4 @@
-"""What moves while a sequence is recorded: the sensor's vehicle, cars, and people who walk."""
+"""Moving objects of a sequence: the sensor's vehicle, cars, and people who walk."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -156,7 +156,7 @@ def draw_traffic(
 
 
 def _meet(first: Floats, second: Floats) -> bool:
-    """Whether bounds, float64 (T, 2, 2) each, come nearer than the clearance at one time."""
+    """True if bounds, float64 (T, 2, 2) each, come nearer than the clearance at one time."""
     apart = (first[:, 0] > second[:, 1] + KEPT_APART) | (second[:, 0] > first[:, 1] + KEPT_APART)
     return bool((~apart.any(axis=1)).any())
 

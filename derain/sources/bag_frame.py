@@ -46,7 +46,7 @@ class BagFrame(FileFrame):
 
     @property
     def time(self) -> float:
-        """When it was taken, seconds: the stamp of its header, or if that is 0, of the bag."""
+        """Time of the cloud, seconds: the stamp of its header, or if that is 0, of the bag."""
         return self.clouds.seconds(self.cloud_number)
 
     def read(self) -> Scan:

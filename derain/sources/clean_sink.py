@@ -1,4 +1,4 @@
-"""Scans without their rain: files in a folder, and whole bags written anew."""
+"""Scans without their rain: files in a folder, and rewritten bags."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -154,7 +154,7 @@ class CleanSink:
 
 @dataclass(frozen=True)
 class Destination:
-    """Where scans are written without their rain, and what is written of them.
+    """The folder and form in which scans are written without their rain.
 
     Attributes:
         folder: The folder, a path or a URL.
@@ -170,7 +170,7 @@ class Destination:
 
     @property
     def is_stored(self) -> bool:
-        """Whether it is in an object store, even in part."""
+        """True if it is in an object store, even in part."""
         return is_url(self.folder) or (self.removed is not None and is_url(self.removed))
 
     @contextmanager
@@ -207,7 +207,7 @@ class Destination:
         return found
 
     def holds(self, source: Source) -> bool:
-        """Whether all files are there that are written of scans, but for those in stores.
+        """True if all files are there that are written of scans, but for those in stores.
 
         Args:
             source: The scans.
@@ -258,7 +258,7 @@ def _path_of(place: Place) -> Path:
     if is_web(place):
         raise InputError(
             without_secrets(str(place)),
-            "a web server takes no results",
+            "a web server cannot store results",
             "Name a folder, or a URL such as s3://bucket/cleaned.",
         )
     return path_of(str(place)) if is_url(place) else Path(place)

@@ -30,7 +30,7 @@ RAIN_PROBABILITY = "rain_probability"
 
 @dataclass(frozen=True)
 class BagOptions:
-    """What is written of the clouds of a bag.
+    """Options for the written clouds of a bag.
 
     Attributes:
         cleaned_topic: Name of a further topic, of clean clouds; None replaces the clouds of the
@@ -82,7 +82,7 @@ class CleanedBags:
         self.written: list[Path] = []
 
     def takes(self, frame: Frame) -> bool:
-        """Whether a frame is of a bag that is copied."""
+        """True if a frame is of a bag that is copied."""
         return isinstance(frame, BagFrame) and frame.clouds in self._whole
 
     def targets(self) -> list[Path]:
@@ -180,7 +180,7 @@ class CleanedBags:
         if there.is_relative_to(within):
             raise InputError(self.out, f"is inside {bag}", remedy)
         if os.path.lexists(target) and not is_bag(target):
-            raise InputError(target, "is there already, and no bag", remedy)
+            raise InputError(target, "exists, and is not a bag", remedy)
         pattern = ROS1_NAME if clouds.bag.is_ros1 else ROS2_NAME
         names = {topic.name for topic in clouds.bag.topics}
         for option, name in (

@@ -1,4 +1,4 @@
-"""What was done to scans, one by one, as records have it, and added up."""
+"""Results of cleaning, scan by scan as in records, and their totals."""
 
 import base64
 import math
@@ -25,7 +25,7 @@ UNIX_TIMES_FROM = 1e9
 
 @dataclass(frozen=True)
 class CleanedScan:
-    """What was done to one scan.
+    """The result of cleaning one scan.
 
     Attributes:
         scan: Its file.
@@ -66,7 +66,7 @@ class CleanedScan:
 
 @dataclass(frozen=True, eq=False)
 class ScanOutcome:
-    """What became of one scan of a source.
+    """The outcome of one scan of a source.
 
     Attributes:
         frame: The scan.
@@ -90,7 +90,7 @@ class ScanOutcome:
 
     @property
     def figures(self) -> CleanedScan:
-        """What was done to a scan that was cleaned."""
+        """The figures of a cleaned scan."""
         assert self.cleaned is not None
         return self.cleaned
 

@@ -26,7 +26,7 @@ from derain.views.scan_issues import MOST_RAIN, ScanIssue
 
 @dataclass(frozen=True)
 class CleanReport:
-    """What was done to the scans of a source, as :func:`clean` returns it.
+    """The results of :func:`clean` for the scans of a source.
 
     Example:
         >>> report = derain.clean("scan.bin", derain.FilterDerainer(derain.DROR()), "cleaned")
@@ -180,7 +180,7 @@ def clean(
 
 
 def _is_stored(source: Source, sink: CleanSink) -> bool:
-    """Whether scans are read from an object store, or written to one."""
+    """True if scans are read from an object store, or written to one."""
     return sink.destination.is_stored or any(isinstance(each, StoredFrame) for each in source)
 
 

@@ -51,5 +51,5 @@ class Judgement:
 
     @cached_property
     def weather(self) -> ScanWeather:
-        """How bad the weather is that the scan shows: where its rays meet rain, and how far on."""
+        """The weather of the scan: where its rays meet rain, and at what range."""
         return ScanWeather.of(self.scan, self.rain)

@@ -1,4 +1,4 @@
-"""How the scan of a frame is read for a model or a measurement: in its unit, with its labels."""
+"""Reads the scan of a frame for a model or a measurement: in its unit, with its labels."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -58,7 +58,7 @@ class FrameReader:
         return scan.take(first_rows(scan))
 
     def with_labels(self, scan: Scan, frame: Frame) -> Scan:
-        """The scan with the labels of its frame, none of which the data card does not know."""
+        """The scan with the labels of its frame, all of which are on the data card."""
         label = frame.read_label(len(scan))
         if frame.label_map is not None:
             label = frame.label_map(label, str(frame.label_path or frame.name))

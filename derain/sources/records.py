@@ -1,4 +1,4 @@
-"""When and where the scans of a folder were taken: the records that lie beside them.
+"""Times and poses of the scans of a folder, from the records that lie beside them.
 
 - ``times.txt``: a line a scan, seconds. Or ``metadata.csv``, see :mod:`derain.files.frame_times`.
 - ``poses.txt``: a line a scan, or poses by time; see :mod:`derain.sources.trajectory`.
@@ -36,7 +36,7 @@ class Records:
         self.folder = folder
 
     def time_of(self, scan: Path) -> float | None:
-        """When a scan of the folder was taken, seconds; None if not known.
+        """Time at which a scan of the folder was taken, seconds; None if not known.
 
         Raises:
             InputError: A record that is damaged or does not fit the scans.

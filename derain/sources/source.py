@@ -1,4 +1,4 @@
-"""Where scans come from: frames in time order."""
+"""Sources of scans: frames in time order."""
 
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, overload

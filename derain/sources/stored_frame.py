@@ -24,7 +24,7 @@ Value = TypeVar("Value")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StoredFrame(FileFrame):
-    """What lies in an object store; its path only names it.
+    """A frame in an object store; its path only names it.
 
     Attributes:
         objects: What is to be fetched.
@@ -72,7 +72,7 @@ class StoredScan(StoredFrame):
 
     @property
     def time(self) -> float | None:
-        """When it was taken, seconds."""
+        """Time at which it was taken, seconds."""
         return _value(self.recorded[0])
 
     @property
@@ -130,7 +130,7 @@ class StoredBag(StoredFrame):
 
     @property
     def time(self) -> float | None:
-        """When the cloud was taken, seconds."""
+        """Time at which the cloud was taken, seconds."""
         return self.seconds
 
     def fetched(self, where: Mirror) -> list[FileFrame]:
@@ -173,7 +173,7 @@ class StoredBag(StoredFrame):
 
 
 def _value(recorded: Value | InputError) -> Value:
-    """What a record has.
+    """The content of a record.
 
     Raises:
         InputError: It is damaged.

@@ -1,4 +1,4 @@
-"""Where a sensor was, in files of two forms.
+"""Poses of a sensor, in files of two formats.
 
 - KITTI's: twelve numbers a line, the upper three rows of a pose, row by row. With a ``calib.txt``
   beside it they are poses of the camera that it names ``Tr`` for; without one, the sensor's own.
@@ -64,7 +64,7 @@ class Trajectory:
         return sha256(self.poses.tobytes() + times).hexdigest()
 
     def is_by_time(self, times: Sequence[float] | NDArray[np.float64]) -> bool:
-        """Whether scans find their poses by time: both have times, of one clock it seems.
+        """True if scans find their poses by time: both have times, of one clock it seems.
 
         Args:
             times: When the scans were taken, seconds, (N,).

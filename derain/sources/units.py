@@ -30,7 +30,7 @@ BLOCK = 50
 
 @dataclass(frozen=True)
 class Division:
-    """How a source is divided into units.
+    """The division of a source into units.
 
     Example:
         >>> report = derain.clean(
@@ -52,7 +52,7 @@ class Division:
     anew: bool = False
 
     def keeps_records(self, source: Sequence[Frame], folder: Place) -> bool:
-        """Whether there is a record of each unit: it is asked for, or begun, or takes long.
+        """True if each unit has a record: on request, for a run begun before, or for many scans.
 
         Args:
             source: The scans.
@@ -156,12 +156,12 @@ def units_of(source: Sequence[Frame], method: Method | None, block: int = BLOCK)
 
 
 def whole(source: Sequence[Frame]) -> FrameUnit:
-    """All frames of a source as one unit, of which no record is kept."""
+    """All frames of a source as one unit, without a record."""
     return FrameUnit(id="", size=0, inputs="", frames=tuple(source))
 
 
 def shared_options(command: str, source: Sequence[Frame], block: int) -> dict[str, Any]:
-    """What the results of any command depend on but the content of the scans, for its job.
+    """The options that the results of any command depend on besides the scans, for its job.
 
     Args:
         command: Name of the command.
@@ -196,7 +196,7 @@ Span = tuple[Sequence[Frame], int, int, Window]
 
 
 def spans_of(source: Sequence[Frame], method: Method | None, block: int) -> list[Span]:
-    """Where the units of a source begin and end; arguments as for :func:`units_of`."""
+    """Begin and end of each unit of a source; arguments as for :func:`units_of`."""
     return [span for each in recordings_of(source) for span in _spans_of(each, method, block)]
 
 

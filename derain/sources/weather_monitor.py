@@ -19,7 +19,7 @@ SAMPLED_SCANS = 5
 
 @dataclass(frozen=True)
 class WeatherOptions:
-    """How the weather of a recording is measured.
+    """Options for measuring the weather of a recording.
 
     Attributes:
         every_scan: Whether every scan is measured; otherwise SAMPLED_SCANS are, for the weather of

@@ -46,7 +46,7 @@ class FileDocuments:
         return None
 
     def read_each(self, names: Sequence[str]) -> Iterator[bytes | None]:
-        """The contents of many, each read when it is asked for."""
+        """The contents of many, each read at its first use."""
         yield from map(self.read, names)
 
     def write(self, name: str, text: str) -> None:

@@ -38,7 +38,7 @@ class Extra:
 
     @property
     def installed(self) -> bool:
-        """Whether the library is installed; it is not imported."""
+        """True if the library is installed; it is not imported."""
         return find_spec(self.library) is not None
 
     def load(self, subject: str | Path, submodule: str = "") -> ModuleType:
@@ -61,7 +61,7 @@ class Extra:
             raise InputError(
                 subject,
                 f"needs {name}, which cannot be imported ({reason_of(error)})",
-                "Install what it names, or the library anew.",
+                "Install the package that it names, or reinstall the library.",
             ) from error
 
 

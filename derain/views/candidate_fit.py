@@ -1,4 +1,4 @@
-"""Fits candidates to scans of which it is known what is rain."""
+"""Fits candidates to scans with known rain."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -101,7 +101,7 @@ class _Side:
     rain: NDArray[np.bool_]
 
     def limit(self, outside: float) -> float:
-        """What is above this is no rain; infinite where too little rain has a value to say.
+        """The limit above which nothing is rain; infinite if too little rain has a value.
 
         Args:
             outside: Share of the rain that may be above it, were there no margin.

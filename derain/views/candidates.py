@@ -17,7 +17,7 @@ LARGEST_FLOAT32 = float(np.finfo(np.float32).max)
 
 @dataclass(frozen=True)
 class Bound:
-    """What a channel of rain is at least, and at most.
+    """Bounds of one channel: the least and the greatest value of rain.
 
     Attributes:
         channel: Its name, as :meth:`Scan.channel` takes it.
@@ -30,7 +30,7 @@ class Bound:
     most: float | None = None
 
     def holds(self, values: NDArray[np.float32]) -> NDArray[np.bool_]:
-        """True for values within the bound, bool (N,); of what is not known, NaN, it says True."""
+        """True for values within the bound, bool (N,); also True for unknown values, NaN."""
         outside = np.zeros(len(values), bool)
         # Nothing is less or greater than NaN. A bound as float32 compares as fast as can be.
         if self.least is not None:
@@ -66,7 +66,7 @@ class Candidates:
     rain_share: float = 0.0
 
     def among(self, scan: Scan) -> NDArray[np.bool_]:
-        """Which rows of a scan are candidates.
+        """True for rows of a scan that are candidates.
 
         A channel that the scan has not got, or a value that it lacks, excludes no point.
 
@@ -110,7 +110,7 @@ def narrower(some: Iterable[Bound], others: Iterable[Bound]) -> tuple[Bound, ...
 
 
 def candidates_at(entry: Entry) -> Candidates | None:
-    """The candidates that stand in a document, which is not trusted; None where it has none.
+    """Reads candidates from an untrusted document; None if it has none.
 
     Raises:
         InputError: Something that does not describe them.
@@ -121,7 +121,7 @@ def candidates_at(entry: Entry) -> Candidates | None:
 
 
 def bounded_channels(channels: Sequence[str]) -> tuple[str, ...]:
-    """What candidates of a network may be bounded by: range, height, and what else it sees.
+    """Channels that may bound a network's candidates: range, height, and its other inputs.
 
     A place to the left or right, or before or behind, tells nothing of rain but where it fell. And
     what the network is blind to, such as the intensity of an unknown sensor, its candidates must

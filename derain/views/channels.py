@@ -42,7 +42,7 @@ def with_columns(scan: Scan, channels: Sequence[str]) -> Scan:
 def channel_values(
     scan: Scan, rows: NDArray[np.int64], channels: Sequence[str]
 ) -> NDArray[np.float32]:
-    """What some points of a scan measure.
+    """Values of a channel at some points of a scan.
 
     Args:
         scan: The scan.
@@ -66,7 +66,7 @@ def filled_values(
     channels: Sequence[str],
     fill_value: Mapping[str, float],
 ) -> NDArray[np.float32]:
-    """What some points of a scan measure, point by point, and a stand-in for what they lack.
+    """Values of channels at some points of a scan, with replacements for missing ones.
 
     Args:
         scan: The scan.
@@ -94,7 +94,7 @@ def channel_image(
     channels: Sequence[str],
     fill_value: Mapping[str, float],
 ) -> NDArray[np.float32]:
-    """What the points in the pixels of an image measure, and a stand-in for what they lack.
+    """Values of channels in the pixels of an image, with replacements for missing ones.
 
     Args:
         scan: The scan.

@@ -91,7 +91,7 @@ class DirectionTable:
 
 
 def _table(of_bins: NDArray[np.int64], borders: NDArray[np.float64]) -> NDArray[np.int32]:
-    """What each bin holds, int32 (BINS + 1,): the last is for what is BINS itself."""
+    """The entry of each bin, int32 (BINS + 1,): the last is for the value BINS itself."""
     table = np.append(of_bins, UNSURE).astype(np.int32)
     for near in (borders - BORDER_MARGIN, borders + BORDER_MARGIN):
         table[np.clip(near, 0, BINS).astype(np.int64)] = UNSURE

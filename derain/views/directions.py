@@ -1,4 +1,4 @@
-"""Where a sensor saw returns, which of them in one direction, and whether that is chance.
+"""Directions of returns: which returns share a direction, and whether that is chance.
 
 A sensor of two returns gives both the direction of their ray, to the last digits of the numbers.
 Between these and the neighbouring rays nothing lies: where directions agree by chance, as those of

@@ -1,4 +1,4 @@
-"""The full scale of intensities, which tells their unit."""
+"""The full scale of intensities, which shows their unit."""
 
 from collections.abc import Sequence
 

@@ -59,7 +59,7 @@ def are_one_return(
     neighbours: NDArray[np.int64],
     distances: NDArray[np.float32],
 ) -> NDArray[np.bool_]:
-    """Which neighbours of some points are one return with them.
+    """True for neighbours of some points that are one return with them.
 
     Args:
         xyz: Distinct positions in the sensor's frame, float32 (M, 3), metres.

@@ -85,7 +85,7 @@ class Neighbourhoods(ViewedScan):
         return inputs
 
     def target(self, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """What the network is to say of each point that it scores.
+        """Training target of each point that it scores.
 
         Args:
             rain: Truth for every row of the scan, bool (N,).
@@ -97,7 +97,7 @@ class Neighbourhoods(ViewedScan):
         return rain[first].astype(np.int64)
 
     def back_projection(self) -> BackProjection:
-        """What gives every row the score of its point, and 0 where that has none."""
+        """Back-projection: gives every row the score of its point, and 0 if that has none."""
         if self.candidates is None:
             return partial(_to_rows, self.inverse)
         return partial(of_points_to_rows, self.inverse, self._of_candidates, len(self.points))
@@ -133,7 +133,7 @@ class Neighbourhoods(ViewedScan):
 @VIEWS.add("neighbours")
 @dataclass(frozen=True)
 class NeighbourView(View):
-    """How a scan becomes neighbourhoods; the same in training and in deployment.
+    """Converts a scan into neighbourhoods; the same in training and in deployment.
 
     Args:
         neighbours: k, the size of a neighbourhood, the point itself included.
@@ -170,7 +170,7 @@ class NeighbourView(View):
 
     @property
     def azimuth(self) -> tuple[float, float]:
-        """What it sees: everything around."""
+        """Its field of view: everything around."""
         return ALL_AROUND
 
     def with_candidates(self, candidates: Candidates) -> Self:

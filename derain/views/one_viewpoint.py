@@ -1,4 +1,4 @@
-"""Whether points are what one LiDAR sees from where it stands, in metres.
+"""Checks that points are the view of one LiDAR from one place, in metres.
 
 Whatever derains a scan takes that for granted: neighbours are judged by distances in metres, and by
 how far apart rays of one sensor are at that range. Each check is told by a share of the points far
@@ -85,7 +85,7 @@ FEWEST_ARMS = 4
 
 
 def viewpoint_issues(scan: Scan) -> Iterator[ScanIssue]:
-    """Says where a scan is not what one sensor sees from where it stands, in metres.
+    """Returns the signs that a scan is not the view of one sensor from one place, in metres.
 
     Of a scan that is too far off or too small nothing else can be said.
 
@@ -110,7 +110,7 @@ def viewpoint_issues(scan: Scan) -> Iterator[ScanIssue]:
 
 
 def _beyond_all_sensors(scan: Scan) -> Iterator[ScanIssue]:
-    """Whether most of the rows are points, and too far off for any unit: those of a map."""
+    """True if most of the rows are points, and too far off for any unit: those of a map."""
     finite = np.isfinite(scan.xyz).all(axis=1)
     beyond = (np.abs(scan.xyz[finite]) > LARGEST_COORDINATE).any(axis=1)
     if 2 * beyond.sum() > len(scan):
@@ -122,7 +122,7 @@ def _beyond_all_sensors(scan: Scan) -> Iterator[ScanIssue]:
 
 
 def _elsewhere(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
-    """Whether points, float64 (M, 3), lie together, far from the origin."""
+    """True if points, float64 (M, 3), lie together, far from the origin."""
     centre = np.median(sample, axis=0)
     around = float(np.median(np.linalg.norm(sample - centre, axis=1)))
     away = float(np.linalg.norm(centre))
@@ -136,7 +136,7 @@ def _elsewhere(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
 
 
 def _in_other_units(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
-    """Whether points, float64 (M, 3), are farther off or nearer than sensors see in metres."""
+    """True if points, float64 (M, 3), are farther off or nearer than sensors see in metres."""
     range_ = np.linalg.norm(sample, axis=1)
     far, near = np.percentile(range_, [FAR_PERCENTILE, 99])
     height = _height(sample)
@@ -167,7 +167,7 @@ def _in_other_units(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
 
 
 def _height(sample: NDArray[np.float64]) -> float:
-    """How far below the sensor the ground of points, float64 (M, 3), is, metres; NaN if unseen."""
+    """Depth of the ground below the sensor, metres; points are float64 (M, 3). NaN if unseen."""
     x, y, z = sample.T
     below = z[z < np.tan(np.radians(BELOW_HORIZON)) * np.hypot(x, y)]
     if len(below) < FEWEST_OF_GROUND:
@@ -176,7 +176,7 @@ def _height(sample: NDArray[np.float64]) -> float:
 
 
 def _of_one_beam(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
-    """Whether points, float64 (M, 3), are all of one plane or cone of rays."""
+    """True if points, float64 (M, 3), are all of one plane or cone of rays."""
     rays = sample / np.linalg.norm(sample, axis=1, keepdims=True)
     lowest, highest = np.degrees(np.arcsin(np.percentile(rays[:, 2], [1, 99]).clip(-1, 1)))
     # Not a product of matrices, whose threads would take longer to wake than it takes.
@@ -191,7 +191,7 @@ def _of_one_beam(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
 
 
 def _of_many_viewpoints(scan: Scan) -> Iterator[ScanIssue]:
-    """Whether points are denser, or surfaces more often torn, than one sensor would see them."""
+    """True if points are denser, or surfaces more often torn, than one sensor would see them."""
     rays = rays_near_axes(scan)
     crowding, step = crowding_far_off(rays), range_step(rays)
     if crowding > MORE_CROWDED:
@@ -223,7 +223,7 @@ def rays_near_axes(scan: Scan) -> Rays:
 
 
 def crowding_far_off(rays: Rays) -> float:
-    """How much closer, in angle, points lie together at some range than the nearest ones do.
+    """Density of points in angle at some range, relative to that of the nearest ones.
 
     Args:
         rays: Azimuth, inclination and range of points, as :func:`rays_near_axes` gives them; those
@@ -249,7 +249,7 @@ def crowding_far_off(rays: Rays) -> float:
 
 
 def range_step(rays: Rays) -> float:
-    """How much the range changes from one ray of a beam to the next: the median, as a ratio less 1.
+    """Change of range from one ray of a beam to the next: the median, as a ratio less 1.
 
     Args:
         rays: Azimuth, inclination and range of points, as :func:`rays_near_axes` gives them; of
@@ -272,7 +272,7 @@ def range_step(rays: Rays) -> float:
 
 
 def _near_axes(scan: Scan) -> NDArray[np.bool_]:
-    """Which points are near the x and y axes and the diagonals between them, bool (N,)."""
+    """True for points that are near the x and y axes and the diagonals between them, bool (N,)."""
     near = np.zeros(len(scan), bool)
     x, y = np.ascontiguousarray(scan.xyz[:, :2].T)
     with np.errstate(invalid="ignore"):

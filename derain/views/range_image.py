@@ -74,7 +74,7 @@ class RangeImage(ViewedScan):
         return {"image": self.image[None], "valid": self.valid[None, None]}
 
     def target(self, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """What the network is to say of each pixel.
+        """Training target of each pixel.
 
         Args:
             rain: Truth for every row of the scan, bool (N,).
@@ -89,7 +89,7 @@ class RangeImage(ViewedScan):
         return result
 
     def back_projection(self) -> BackProjection:
-        """What gives points scores of pixels as ``back_projection_name`` says.
+        """Back-projection of pixel scores to points, by ``back_projection_name``.
 
         Rows off the grid, and rows that are no candidates, have 0; a pixel that shows what is no
         candidate counts as scored 0, whatever the network says of it.
@@ -136,7 +136,7 @@ def _to_rows(
 @VIEWS.add("range")
 @dataclass(frozen=True)
 class RangeView(View):
-    """How a scan becomes a range image; the same in training and in deployment.
+    """Converts a scan into a range image; the same in training and in deployment.
 
     The nearest return wins a pixel; of equally near ones that of the lowest row.
 
@@ -190,7 +190,7 @@ class RangeView(View):
 
     @property
     def azimuth(self) -> tuple[float, float]:
-        """What it sees: the grid's right and left bound, degrees counter-clockwise from x."""
+        """Its field of view: the grid's right and left bound, degrees counter-clockwise from x."""
         return self.grid.azimuth
 
     def with_candidates(self, candidates: Candidates) -> Self:
@@ -227,7 +227,7 @@ class RangeView(View):
 
 
 def _shown(pixel: NDArray[np.int64], distance: NDArray[np.float32], size: int) -> NDArray[np.void]:
-    """What each pixel shows: the nearest point, the lowest row of equally near ones.
+    """The point in each pixel: the nearest one, the lowest row of equally near ones.
 
     Args:
         pixel: Pixel of each point, int64 (N,); -1 for those in none.

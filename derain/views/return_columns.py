@@ -1,4 +1,4 @@
-"""What a file's own columns say of returns: which is the first of its ray, and which follow."""
+"""Returns by a file's own columns: which is the first of its ray, and which follow."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ AUTOWARE_LARGEST = 7
 
 @dataclass(frozen=True, eq=False)
 class StatedReturns:
-    """What one or two columns say of the returns of a scan.
+    """The returns of a scan by one or two of its columns.
 
     Attributes:
         column: Name of the column.
@@ -48,7 +48,7 @@ class StatedReturns:
 
 
 def stated_returns(scan: Scan) -> StatedReturns | None:
-    """What a scan's columns say of its returns.
+    """Reads the returns of a scan from its columns.
 
     A column by which no ray has two says nothing: writers fill in 1 where they do not know.
 
@@ -99,7 +99,7 @@ def _of_las_bits(scan: Scan, columns: Columns) -> StatedReturns | None:
 def _of_so_many(
     scan: Scan, name: str, number: NDArray[np.int64], count: NDArray[np.int64]
 ) -> StatedReturns | None:
-    """What numbers from 1 say where the number of returns of each ray is known."""
+    """Returns by numbers from 1, if the number of returns of each ray is known."""
     several = scan.valid & (count > 1) & (number >= 1) & (number <= count)
     if not several.any():
         return None
@@ -153,7 +153,7 @@ def _of_second_ranges(scan: Scan, columns: Columns) -> StatedReturns | None:
 
 
 def _counted(scan: Scan, name: str, number: NDArray[np.int64]) -> StatedReturns | None:
-    """What numbers from 0 or from 1 say where nobody says how many returns a ray has.
+    """Returns by numbers from 0 or 1, if the number of returns of each ray is not known.
 
     The first return may be the only one of its ray: whether it is, its direction has to tell.
     """

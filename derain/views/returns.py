@@ -55,7 +55,7 @@ class RayReturns:
 
     @property
     def dual(self) -> bool:
-        """Whether any ray is known to have two returns."""
+        """True if any ray is known to have two returns."""
         return bool(self.found_by)
 
 
@@ -114,7 +114,7 @@ def _pair(scan: Scan) -> RayReturns:
 def _of_pairs(
     near: NDArray[np.int64], far: NDArray[np.int64], ranges: NDArray[np.float32]
 ) -> RayReturns:
-    """What points are of their rays, from the pairs of them.
+    """The return number of points, from their pairs.
 
     Args:
         near: The nearer point of each pair, int64 (P,).
@@ -140,7 +140,7 @@ def _to_rows(
     inverse: NDArray[np.int64],
     stated: StatedReturns | None,
 ) -> RayReturns:
-    """What rows are of their rays, from what was found of distinct positions and was stated.
+    """The return number of rows, from that of distinct positions and the stated returns.
 
     Args:
         found: Of M positions.

@@ -1,4 +1,4 @@
-"""What may be wrong with a scan; each method chooses which of it matters to itself."""
+"""Possible faults of a scan; each method chooses those that matter to it."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -43,10 +43,10 @@ class ScanIssue:
 
 
 class ScanChecker(Protocol):
-    """What scans are judged by, and what can say of a scan beforehand whether it suits."""
+    """A method of judging scans that can check beforehand whether a scan suits it."""
 
     def issues(self, scan: Scan) -> Iterator[ScanIssue]:
-        """What is odd about a scan before it is judged.
+        """Warnings about a scan before it is judged.
 
         Args:
             scan: The scan, its intensities in the unit of the method. One without a point that can
@@ -73,7 +73,7 @@ def missing_intensity(
     scan: Scan,
     consequence: str = "nothing can be found without; name its column, or take default or dror",
 ) -> Iterator[ScanIssue]:
-    """Whether a scan lacks the intensity that a method needs.
+    """True if a scan lacks the intensity that a method needs.
 
     Args:
         scan: The scan.
@@ -85,7 +85,7 @@ def missing_intensity(
 
 
 def intensity_unlike_training(scan: Scan, mean: float, unit: str, data: str) -> Iterator[ScanIssue]:
-    """Whether a scan's intensities are of another unit than a model's training data.
+    """True if a scan's intensities are of another unit than a model's training data.
 
     Args:
         scan: The scan.
@@ -108,7 +108,7 @@ def intensity_unlike_training(scan: Scan, mean: float, unit: str, data: str) -> 
 
 
 def intensity_of_another_scale(scan: Scan, expected: float, whose: str) -> Iterator[ScanIssue]:
-    """Whether a scan's intensities have another full scale than expected.
+    """True if a scan's intensities have another full scale than expected.
 
     Args:
         scan: The scan.
@@ -131,7 +131,7 @@ def intensity_of_another_scale(scan: Scan, expected: float, whose: str) -> Itera
 
 
 def outside_view(scan: Scan, judged: NDArray[np.bool_], data: str) -> Iterator[ScanIssue]:
-    """Whether much of a scan lies outside what a model sees.
+    """True if much of a scan lies outside what a model sees.
 
     Only who judged the scan can say: to project it once more would take as long as the view. A
     bench does not, whose methods give no more than what they call rain, and whose recall counts
@@ -152,7 +152,7 @@ def outside_view(scan: Scan, judged: NDArray[np.bool_], data: str) -> Iterator[S
 
 
 def much_removed(share: float) -> Iterator[ScanIssue]:
-    """Whether a method calls more of a scan rain than rain ever was.
+    """True if a method calls more of a scan rain than rain ever was.
 
     Args:
         share: Share of the points that can be judged which it calls rain.
@@ -166,13 +166,13 @@ def much_removed(share: float) -> Iterator[ScanIssue]:
 
 
 def no_points(scan: Scan) -> Iterator[ScanIssue]:
-    """Whether a scan holds no points: by its format that may be, but it was hardly meant."""
+    """True if a scan holds no points: by its format that may be, but it was hardly meant."""
     if not len(scan):
         yield ScanIssue("no points", "it holds no points: the file may be a copy that failed")
 
 
 def left_out(scan: Scan) -> Iterator[ScanIssue]:
-    """Whether a scan's file holds what is not written with the cleaned scan."""
+    """True if a scan's file holds what is not written with the cleaned scan."""
     if isinstance(scan.header, PartialHeader) and scan.header.left_out:
         yield ScanIssue(
             "parts of the file that are not written",

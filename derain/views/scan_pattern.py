@@ -1,4 +1,4 @@
-"""How a sensor scans, as its returns tell: field of view, beams, and steps between returns."""
+"""The scan pattern of a sensor, from its returns: field of view, beams, and angular steps."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ Extent = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class ReturnAngles:
-    """Where the returns of one scan came from.
+    """Directions of the returns of one scan.
 
     Attributes:
         azimuth: Of each valid point, float64 (N,), degrees in [-180, 180].
@@ -94,7 +94,7 @@ def inclination_extent(inclination: NDArray[np.float64]) -> Extent:
 
 
 def find_beams(scans: Sequence[ReturnAngles]) -> NDArray[np.float64]:
-    """Inclinations of the sensor's beams, where they can be told.
+    """Inclinations of the sensor's beams, if they can be found.
 
     Args:
         scans: Angles of the returns of one or more scans of one sensor.

@@ -223,7 +223,7 @@ def grid_of(config: str | Mapping[str, Any], source: str | Path) -> SphericalGri
 
 
 def grid_at(entry: Entry) -> SphericalGrid:
-    """The grid that stands in a document, as :func:`grid_of` takes it.
+    """Reads a grid from a document, as :func:`grid_of` takes it.
 
     Raises:
         InputError: An unknown name, or something that does not describe a grid.

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Window:
-    """How many scans before and after one a view asks for; none by default.
+    """Number of scans before and after one that a view needs; none by default.
 
     Attributes:
         before: Scans before it in its sequence.
@@ -37,7 +37,7 @@ class Window:
 
     @property
     def is_one_scan(self) -> bool:
-        """Whether the view asks for nothing but the scan that is judged."""
+        """True if the view needs only the scan that is judged."""
         return not (self.before or self.after)
 
 

@@ -10,7 +10,7 @@ from derain.weather.visibility import NOT_KNOWN, Visibility
 
 
 class Level(IntEnum):
-    """How bad the visibility is, in the numbers of ROS's diagnostics: OK, WARN and ERROR."""
+    """Level of visibility, in the numbers of ROS's diagnostics: OK, WARN and ERROR."""
 
     CLEAR = 0
     WARNING = 1
@@ -22,7 +22,7 @@ class Level(IntEnum):
 
 @dataclass(frozen=True)
 class Threshold:
-    """Where a level begins, and where it ends.
+    """The visibilities at which a level begins and ends.
 
     Example:
         >>> alarm = Alarm(warning=Threshold(below=50, above=60), error=Threshold(10, 12), hold=3)

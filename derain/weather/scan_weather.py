@@ -44,7 +44,7 @@ class ScanWeather:
 
     @classmethod
     def of(cls, points: Scan | NDArray[Any], rain: NDArray[np.bool_]) -> Self:
-        """What a scan shows.
+        """The weather of a judged scan.
 
         Args:
             points: A Scan, or (N, ≥ 3) numbers: x, y, z in metres, in the frame of the sensor.
@@ -58,7 +58,7 @@ class ScanWeather:
             raise InputError(
                 "rain",
                 f"it is {rain.dtype} of shape {rain.shape} for {len(scan):,} points",
-                "Give one truth value for each point.",
+                "Give True or False for each point.",
             )
         return cls(ray_ends(scan, rain))
 

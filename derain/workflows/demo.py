@@ -51,7 +51,7 @@ TRIALS = 100
 
 @dataclass(frozen=True)
 class DemoConfig:
-    """What the demonstration does. Another than the usual one takes less time.
+    """Options of the demonstration. Options other than the defaults make it shorter.
 
     Attributes:
         out: Folder that everything is written to.

@@ -66,7 +66,7 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
         raise InputError(
             config.recordings[0],
             f"{scans}: too few to learn from some and choose by others",
-            f"Record {FEWEST_SCANS} or more, one right after the other; twenty are enough.",
+            f"Record {FEWEST_SCANS} or more, one after the other; twenty are enough.",
         )
     student = student_of(config, source)
     require_writable(config.out)
@@ -74,7 +74,7 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
     keep_freed_memory()
     show(f"{len(source):,} scans to learn from. Everything but the model goes to {config.work}/")
     if student.blind and not config.blind and student.start is None:
-        show("The scans have no intensities: the network learns without.")
+        show("The scans have no intensities: the network is trained without them.")
     steps = Steps(show, LEARN_STEPS + config.needs_odometry(source))
     with recorded_warnings() as warnings:
         poses = _find_poses(config, source, steps)
@@ -150,16 +150,14 @@ def _settings(config: LearnConfig, student: Student) -> dict[str, object]:
 
 
 def _clear(work: Path) -> None:
-    """Makes the folder of everything but the model anew.
+    """Empties the folder of everything but the model.
 
     Raises:
         InputError: It holds something that no earlier run has written.
     """
     mark = work / MARK
     if work.is_dir() and any(work.iterdir()) and not mark.is_file():
-        raise InputError(
-            work, "holds something other than what an earlier run left", "Give another --work."
-        )
+        raise InputError(work, "holds files that no earlier run wrote", "Give another --work.")
     require_writable(mark)
     for left in work.iterdir():
         shutil.rmtree(left) if left.is_dir() and not left.is_symlink() else left.unlink()

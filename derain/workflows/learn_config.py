@@ -1,4 +1,4 @@
-"""What is learnt from which recording, and by which network."""
+"""Options of learning: the recording, the teacher and the network."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ BLIND = {"outdet": "[x,y,z]", "salsanext": "[range,x,y,z]", "salsanext_lite": "[
 
 @dataclass(frozen=True)
 class LearnConfig:
-    """What is learnt from what.
+    """Options of :func:`derain.workflows.learn.learn`.
 
     Example:
         >>> config = LearnConfig([Path("drive")], Path("model.onnx"), epochs=5)
@@ -87,7 +87,7 @@ class LearnConfig:
         return self.work / "student.ckpt"
 
     def needs_odometry(self, source: Source) -> bool:
-        """Whether poses are to be found before the teaching.
+        """True if poses are to be found before the teaching.
 
         The configuration names odometry, or the teacher needs poses that no file states.
 
@@ -124,7 +124,7 @@ class Student:
 
     @property
     def sees_unit(self) -> bool:
-        """Whether it sees intensity in the unit of its scans; cues do as each scan shows it."""
+        """True if it sees intensity in the unit of its scans; cues do as each scan shows it."""
         return not self.blind and self.network != CUES
 
     def __str__(self) -> str:
@@ -151,15 +151,15 @@ def student_of(config: LearnConfig, source: Source) -> Student:
         network = config.model or STUDENTS[0]
         blind = not sees_intensity and network != CUES
         if network == CUES:
-            _refuse_blind(config.blind, f"{CUES} weighs intensity, as each scan shows it")
+            _refuse_blind(config.blind, f"{CUES} uses intensity")
     else:
         spec = _spec_of_start(config, start)
         network, blind = spec.network, not spec.weighs_intensity
         if "intensity" in spec.channels and not sees_intensity:
             raise InputError(
                 config.recordings[0],
-                f"has no intensities, which {start} sees",
-                "Give a start that is blind to intensity, or name a network by --model.",
+                f"has no intensities, which {start} needs",
+                "Give --start a model without intensity, or name a network by --model.",
             )
     file, settings = _configuration(network)
     if start is not None:
@@ -171,7 +171,7 @@ def student_of(config: LearnConfig, source: Source) -> Student:
 
 
 def _spec_of_start(config: LearnConfig, start: str) -> Spec:
-    """How the model of the start is used."""
+    """The Spec of the model to start from."""
     from derain.models.checkpoint import load_model
 
     checkpoint = checkpoint_of(start)
@@ -196,7 +196,7 @@ def _spec_of_start(config: LearnConfig, start: str) -> Spec:
 
 def _refuse_blind(blind: bool, reason: str) -> None:
     if blind:
-        remedy = "Leave it out, or learn by another network or from another start."
+        remedy = "Leave it out, or give another --model or --start."
         raise InputError("--blind", reason, remedy)
 
 

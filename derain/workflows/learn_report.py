@@ -47,7 +47,7 @@ however bright it is. On held-out scans, beside this teacher:"""
 
 @dataclass
 class LearnResults:
-    """What was learnt from a recording.
+    """The results of learning from a recording.
 
     Attributes:
         title: The recording.
@@ -94,7 +94,7 @@ class LearnResults:
 
     @property
     def trained_on(self) -> int:
-        """How many scans the student learns from."""
+        """Number of scans that the student learns from."""
         return sum(not scan.held_out for scan in self.scans)
 
     def __str__(self) -> str:
@@ -167,7 +167,7 @@ def as_markdown(results: LearnResults) -> str:
 
 
 def doubts(results: LearnResults) -> Iterator[str]:
-    """What a reader should know before trusting the model, a sentence or two each."""
+    """Reasons for caution before trusting the model, a sentence or two each."""
     taught = results.taught
     known = 1 - taught.shares[2]
     if taught.rain_among_known < LEAST_RAIN:

@@ -55,7 +55,7 @@ class FoundPoses:
 
     @property
     def untrusted(self) -> int:
-        """How many scans could not be registered."""
+        """Number of scans that could not be registered."""
         return sum(not each.trusted for each in self.registrations)
 
     def __str__(self) -> str:
@@ -235,7 +235,7 @@ def _refuse_to_overwrite(file: Path, recording: Sequence[Frame], replace: bool) 
 
 
 def _times(recording: Sequence[Frame], form: PoseFormat) -> list[float]:
-    """When the scans of a recording were taken, seconds; empty where not all of it is known.
+    """Times of the scans of a recording, seconds; empty if not all of them are known.
 
     Raises:
         InputError: Times that are missing or do not ascend, for ``tum``.

@@ -35,7 +35,7 @@ class TeachResults:
 
     @property
     def held_out(self) -> int:
-        """How many of the labelled scans are held out."""
+        """Number of labelled scans that are held out."""
         return sum(scan.part == HELD_OUT_PART for scan in self.manifest.scans)
 
 
@@ -91,8 +91,11 @@ def teach_recordings(
 
 def _warn_of_little(results: TeachResults) -> None:
     if unlabelled := results.judged - len(results.manifest.scans):
-        warn(f"{unlabelled:,} of {results.judged:,} scans are left out: nothing is known of them")
+        warn(
+            f"{unlabelled:,} of {results.judged:,} scans are left out: "
+            "the method is sure of none of their points"
+        )
     if not results.answers.rain:
         warn("no rain was found: a network would learn that nothing is rain")
     if not results.held_out:
-        warn("no scan is held out, for that a sequence needs three: all are for training")
+        warn("no scan is held out, which takes three scans of a sequence: all are for training")

@@ -28,8 +28,8 @@ READING = """\
 - `-` is a score that is undefined: precision where no point was called rain, recall where none is
   rain, F1 and IoU where neither holds. A mean over scans is over the scans that have the score.
 - `IoU 95 %` is the bootstrap interval over scans, `behind best` that of the difference to the best
-  IoU, on the same draws: one that reaches 0 does not separate the two on these scans. Scans that
-  follow each other are alike, which makes both too narrow.
+  IoU, on the same draws: one that reaches 0 does not separate the two on these scans. Consecutive
+  scans are alike, which makes both too narrow.
 - ms are from file to mask, median and 95th percentile, each method alone in a process of its own
   and no search for neighbours shared. MiB is that process's largest resident memory, Python and its
   libraries included.
@@ -97,9 +97,9 @@ def as_markdown(rows: Sequence[Row], facts: Mapping[str, Any]) -> str:
         parts += ["## IoU by sensor", _groups(rows, lambda row: row.scores.by_sensor)]
     parts += ["## Milliseconds by stage, median and 95th percentile", _by_stage(rows)]
     if changed := facts.get("runtimes"):
-        parts += ["## What another runtime changes", runtimes_table(changed), OTHER_RUNTIMES]
+        parts += ["## Other runtimes", runtimes_table(changed), OTHER_RUNTIMES]
     if failures := _failures(rows):
-        parts += ["## What failed", failures]
+        parts += ["## Failures", failures]
     return "\n\n".join([*parts, facts["versions"]])
 
 

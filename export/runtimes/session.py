@@ -70,12 +70,12 @@ class Session(ABC):
     @property
     @abstractmethod
     def inputs(self) -> dict[str, TensorType]:
-        """What the network takes, by name."""
+        """Inputs of the network, by name."""
 
     @property
     @abstractmethod
     def outputs(self) -> list[TensorType]:
-        """What the network gives, in order."""
+        """Outputs of the network, in order."""
 
     @abstractmethod
     def run(self, inputs: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
@@ -143,7 +143,7 @@ class Runtime:
 
     @property
     def is_default(self) -> bool:
-        """Whether it is what runs models where nobody asks for another."""
+        """True if it is what runs models where nobody asks for another."""
         return self == Runtime()
 
     def __str__(self) -> str:

@@ -58,7 +58,7 @@ class DrawnEpochs:
         self.last: int | None = None
 
     def begins(self, trainer: lightning.Trainer) -> bool:
-        """Whether what is measured now is drawn; called once, when a validation or test begins."""
+        """True if what is measured now is drawn; called once, when a validation or test begins."""
         if trainer.sanity_checking or not self.pictures:
             return False
         if trainer.state.fn != TrainerFn.FITTING:

@@ -94,7 +94,7 @@ class CueFusion(SupervisedModule):
         return IsolatedPointView(self.hparams["neighbours"])
 
     def accepts_view(self, view: View) -> bool:
-        """Whether the network can take what a Spec's view gives: as many neighbours."""
+        """True if the network can take what a Spec's view gives: as many neighbours."""
         return isinstance(view, IsolatedPointView) and view.neighbours == self.hparams["neighbours"]
 
     def forward(self, **inputs: Tensor) -> Tensor:

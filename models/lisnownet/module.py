@@ -146,8 +146,8 @@ class LiSnowNet(DerainingModule, Published):
         if network.channels != 2:
             raise InputError(
                 cls.NAME,
-                f"the weights see {network.channels} channels",
-                "Give weights that see range and intensity.",
+                f"the weights are for {network.channels} channels",
+                "Give weights for range and intensity.",
             )
         model = cls(grid=require_grid(grid, cls.NAME), width=network.width)
         model.network = network

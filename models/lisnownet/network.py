@@ -187,7 +187,7 @@ class LiSnowNetwork(nn.Module):
 
 
 def varies(image: Tensor) -> Tensor:
-    """Which images are more than one value throughout, as far as bfloat16 can tell.
+    """True for images that are more than one value throughout, as far as bfloat16 can tell.
 
     Others teach nothing: where nothing varies, each BatchNorm divides by the root of its ε alone,
     which multiplies the gradient by 300, layer after layer, beyond all numbers.

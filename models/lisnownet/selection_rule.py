@@ -167,7 +167,7 @@ def denoising_change(seen: Tensor, denoised: Tensor) -> Tensor:
 
 
 def may_be_rain(image: Tensor, rule: SelectionRule) -> Tensor:
-    """Which pixels may be rain by their height and intensity, bool (B, 1, H, W)."""
+    """True for pixels that may be rain by their height and intensity, bool (B, 1, H, W)."""
     _, height, intensity = image.split(1, dim=1)
     return (height > rule.ground) & (intensity < rule.intensity * rule.full_scale)
 

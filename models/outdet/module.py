@@ -101,7 +101,7 @@ class OutDet(SupervisedModule, Published):
         return NeighbourView(self.hparams["neighbours"], self.channels)
 
     def accepts_view(self, view: View) -> bool:
-        """Whether the network can take what a Spec's view gives: as many neighbours as it has."""
+        """True if the network can take what a Spec's view gives: as many neighbours as it has."""
         return isinstance(view, NeighbourView) and view.neighbours == self.hparams["neighbours"]
 
     def forward(

@@ -83,7 +83,7 @@ class RelativeOutDet(SupervisedModule):
         return NeighbourView(self.hparams["neighbours"], self.channels)
 
     def accepts_view(self, view: View) -> bool:
-        """Whether the network can take what a Spec's view gives: all points, and its neighbours."""
+        """True if the network can take what a Spec's view gives: all points, and its neighbours."""
         return (
             isinstance(view, NeighbourView)
             and view.neighbours == self.hparams["neighbours"]

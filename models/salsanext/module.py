@@ -202,8 +202,8 @@ class SalsaNext(SalsaNextModule, Published):
         if (network.channels, network.classes) != (len(cls.CHANNELS), 2):
             raise InputError(
                 cls.NAME,
-                f"the weights tell {network.classes} classes from {network.channels} channels",
-                f"Give weights that tell rain from the rest, from {', '.join(cls.CHANNELS)}.",
+                f"the weights are for {network.classes} classes and {network.channels} channels",
+                f"Give weights for two classes, rain and the rest, from {', '.join(cls.CHANNELS)}.",
             )
         model = cls(grid=require_grid(grid, cls.NAME), width=network.width)
         model.network = network

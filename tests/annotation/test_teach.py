@@ -129,7 +129,7 @@ def test_what_is_no_teachers_stays(make_drive: MakeDrive, tmp_path: Path, name: 
     out = tmp_path / "out"
     (out / name).parent.mkdir(parents=True)
     (out / name).write_text("mine")
-    with pytest.raises(InputError, match="is there already, and no teacher's"):
+    with pytest.raises(InputError, match="exists, and `derain teach` did not write it"):
         teach(Between(), of(make_drive()), out)
     assert files(out) == {name: b"mine"}
 

@@ -186,9 +186,9 @@ def add_private(writer: Any) -> None:
 @pytest.mark.parametrize(
     ("kind", "extra", "reason"),
     [
-        ("zstd", add_stray, "channel 99, which nothing defines"),
-        ("not chunked", add_stray, "channel 99, which nothing defines"),
-        ("no summary", add_stray, "channel 99, which nothing defines"),
+        ("zstd", add_stray, "channel 99, which is not defined"),
+        ("not chunked", add_stray, "channel 99, which is not defined"),
+        ("no summary", add_stray, "channel 99, which is not defined"),
         ("zstd", add_private, "kind 144"),
     ],
 )

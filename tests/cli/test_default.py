@@ -71,7 +71,7 @@ def test_a_method_that_is_named_is_the_one_that_cleans(
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
-        (["crf"], "crf: it is a method's name, and a file or folder here has it, too. Write ./crf"),
+        (["crf"], "crf: it names a method, and also a file or folder here. Write ./crf"),
         (["dror"], "dror: it is a method, and no scans are named. Write `derain run dror SCANS"),
         (["best.yaml"], "best.yaml: it is a method, and no scans are named"),
         (

@@ -174,7 +174,7 @@ def test_a_scan_without_a_valid_point_has_no_grid(facts_of, refused, tmp_path: P
     ("name", "content", "reason"),
     [
         ("none.ckpt", None, "there is no such file"),
-        ("weights.pt", b"12345", "weights alone do not say how they are used"),
+        ("weights.pt", b"12345", "holds weights without the Spec"),
         ("cut.bin", b"12345", "5 bytes are not whole rows of 16 bytes"),
         ("cut.label", b"12345", "is not whole labels of 4 bytes"),
         ("noise.onnx", b"12345", "not an ONNX model"),

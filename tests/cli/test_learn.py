@@ -123,7 +123,7 @@ def test_a_folder_of_something_else_is_not_cleared(refused, recording: Path) -> 
     mine.parent.mkdir()
     mine.touch()
     line = refused("learn", recording, "--out", "model.onnx", "--work", "mine")
-    assert "mine: holds something other than what an earlier run left" in line
+    assert "mine: holds files that no earlier run wrote" in line
     assert mine.exists()
 
 

@@ -96,7 +96,7 @@ def test_a_scan_for_which_the_memory_is_too_small_does_not_end_the_run(
     monkeypatch.setattr(FilterDerainer, "judge", judge_if_small)
     outcome = run_derain("run", "dror", scans, "--out", tmp_path / "out")
     assert outcome.code == 2
-    assert f"derain: {scans / '000003.bin'}: needs more memory than there is" in outcome.err
+    assert f"derain: {scans / '000003.bin'}: needs more memory than is available" in outcome.err
     assert {path.stem for path in (tmp_path / "out").glob("*.label")} == {"000001", "000002"}
 
 

@@ -160,7 +160,7 @@ def _with_dimensions(
 
 def _refused(path: Path) -> InputError:
     return InputError(
-        path, f"only what was read from a {scan_suffix(path)} can be written as one", "Write .npz."
+        path, f"only a scan read from a {scan_suffix(path)} can be written as one", "Write .npz."
     )
 
 
@@ -262,7 +262,7 @@ def _check_layers(data: bytes, begin: int, end: int, size: int, layers: int) -> 
 
 
 def _origin(whole: NDArray[np.int64], scales: NDArray[np.float64]) -> NDArray[np.int64]:
-    """What the coordinates of the scan are relative to."""
+    """The origin of the scan's coordinates."""
     if not ((scales > _FINEST_SCALE) & (scales < LARGEST_COORDINATE)).all():
         raise ValueError(f"the scales of the coordinates are {scales}")
     if not len(whole):

@@ -73,7 +73,7 @@ class Element:
         return "\n".join((f"element {self.name} {self.count}", *map(str, self.properties)))
 
     def size(self, encoding: str) -> int:
-        """How many lines of text (ascii) or bytes (binary) an element without lists takes."""
+        """Number of lines of text (ascii) or bytes (binary) of an element without lists."""
         return self.count * (1 if encoding == "ascii" else self.row(encoding).itemsize)
 
     def row(self, encoding: str, list_length: int | None = None) -> np.dtype[Any]:

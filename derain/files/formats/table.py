@@ -68,7 +68,7 @@ class TableHeader:
         return replace(self, spans=self.spans[rows], columns=columns)
 
     def holds(self, columns: Mapping[str, NDArray[Any]]) -> bool:
-        """Whether the lines hold just these columns, with these numbers."""
+        """True if the lines hold just these columns, with these numbers."""
         return tuple(columns) == tuple(self.columns) and all(
             np.array_equal(ours, theirs, equal_nan=True)
             for ours, theirs in zip(self.columns.values(), columns.values(), strict=True)
@@ -86,7 +86,7 @@ class TableHeader:
 class Table(Format):
     """Lines of numbers, perhaps under a line of names."""
 
-    HELP = "lines of numbers, perhaps under a line of names"
+    HELP = "lines of numbers, optionally after a line of names"
     UNNAMED = "text without a line of names"
     DAMAGE = (ValueError, csv.Error)
 
@@ -277,7 +277,7 @@ def _rows(lines: Iterable[str], separator: str | None) -> Iterator[list[str]]:
 
 
 def _number(text: str) -> float:
-    """The number that a text stands for; an empty one is NaN."""
+    """Parses a number; an empty text is NaN."""
     return float(text.strip() or "nan")
 
 

@@ -42,7 +42,7 @@ class Particles(Columns):
 
 @dataclass(frozen=True, eq=False)
 class Meetings(Columns):
-    """Which particle is met by which beam; a particle and a beam may each be in several.
+    """Pairs of particles and the beams that meet them; each may be in several pairs.
 
     Attributes:
         particle: Row of the particle, int64 (M,).
@@ -68,7 +68,7 @@ class Stretch:
     far: Floats
 
     def holds(self, beam: Ints, distance: Floats) -> Bools:
-        """Whether places on beams, by their distances in metres, are on it, bool (M,)."""
+        """True if places on beams, by their distances in metres, are on it, bool (M,)."""
         return np.asarray((self.near[beam] <= distance) & (distance <= self.far[beam]))
 
 

@@ -1,4 +1,4 @@
-"""What flies in a scan, and the kinds of precipitation that it is drawn from."""
+"""The precipitation of a scan, and the kinds that it is drawn from."""
 
 import math
 from dataclasses import dataclass, field, fields
@@ -24,7 +24,7 @@ SMALLEST, LARGEST = 0.2, 40.0
 
 @dataclass(frozen=True)
 class Precipitation(Settings):
-    """What flies in a scan; the defaults are clear air.
+    """The precipitation of a scan; the defaults are clear air.
 
     Attributes:
         kind: Name of the kind that it was drawn from; nothing depends on it.
@@ -111,7 +111,7 @@ GREATEST = 1e9
 
 
 def is_span_of_decades(span: Span) -> bool:
-    """Whether a number can be drawn from a span evenly in its logarithm, or is always 0."""
+    """True if a number can be drawn from a span evenly in its logarithm, or is always 0."""
     low, high = span
     return (low > 0 or high == 0) and low <= high <= GREATEST
 

@@ -1,4 +1,4 @@
-"""Where particles fly: in all the air, low over the ground, or behind cars."""
+"""Regions of particles: all the air, low over the ground, or behind cars."""
 
 import math
 from dataclasses import dataclass
@@ -116,7 +116,7 @@ class GroundLayer:
     gusts: Gusts
 
     def stretch(self, beams: Floats, stretch: Stretch) -> Stretch:
-        """Where beams are under the top of the layer."""
+        """The part of each beam below the top of the layer."""
         top = self.ground + LAYER_TOP * self.height
         rise = beams[:, 2]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -160,7 +160,7 @@ class Plume:
     length: float
 
     def stretch(self, beams: Floats, stretch: Stretch) -> Stretch:
-        """Where beams are in the sphere around it."""
+        """The part of each beam in the sphere around it."""
         centre = self.start + self.heading * self.length / 2
         radius = math.hypot(self.length / 2, self._half_width(self.length), 2 * PLUME_HEIGHT)
         along = beams @ centre

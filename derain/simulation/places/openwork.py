@@ -1,4 +1,4 @@
-"""What rays pass in part: railings, scaffolds, lattices, trolleys, nets, fences, cables, panes.
+"""Objects that rays pass in part: railings, scaffolds, lattices, nets, fences, cables, panes.
 
 Threads are drawn as wide as beams see them, from some millimetres to some centimetres.
 """
