@@ -1,9 +1,9 @@
-"""What each cue of the model that comes with derain gives: its answers after each of its steps.
+"""Measures the gain of each cue of the model that comes with derain: scores after each step.
 
     python -m benchmarks.cues --shared ../shared
 
-IoU at the model's threshold by geometry alone, after the first and the second time that brightness
-is weighed, and of scans whose intensities are withheld, where brightness is silent.
+Prints the IoU at the model's threshold by geometry alone, after brightness is weighed once and
+twice, and on scans without intensities, which have no brightness.
 """
 
 import argparse

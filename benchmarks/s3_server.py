@@ -16,7 +16,7 @@ REFUSAL = b"<Error><Code>SlowDown</Code><Message>Please reduce your request rate
 
 @dataclass
 class Faults:
-    """What goes wrong with requests.
+    """Faults of requests.
 
     Attributes:
         refuse: Each so manieth request is refused as too fast; 0 for none.

@@ -1,4 +1,4 @@
-"""Shows what decides how fast 3D-OutDet's network runs in one process and in the next.
+"""Shows the causes of different speeds of 3D-OutDet's network from process to process.
 
     python benchmarks/two_speeds.py outdet.onnx scan.bin --threads 2
 

@@ -57,7 +57,7 @@ class ScanDataModule(ScanData, lightning.LightningDataModule):
         return self.source(part)
 
     def draws(self) -> Draws | None:
-        """Which training scans an epoch draws; None, the default, draws each once.
+        """The training scans that an epoch draws; None, the default, draws each once.
 
         Raises:
             InputError: Missing folders or scans.

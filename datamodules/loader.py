@@ -100,7 +100,7 @@ def scan_loader(
 
 
 class LateLoader(DataLoader[Sample | InputError]):
-    """Starts to read when the first batch is asked for, and raises the errors of workers.
+    """Starts to read at the first batch, and raises the errors of workers.
 
     When a run resumes from a checkpoint, Lightning makes the iterators before it sets the epoch,
     and workers read ahead as soon as there is an iterator.

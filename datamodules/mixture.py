@@ -116,7 +116,7 @@ class Mixture(ScanDataModule):
         )
 
     def draws(self) -> Draws:
-        """How many scans of each part an epoch draws.
+        """Number of scans of each part that an epoch draws.
 
         Raises:
             InputError: A part without training scans, or too light for a single one.

@@ -1,4 +1,4 @@
-"""Which scans an epoch draws, and in which order a process reads them."""
+"""The scans that an epoch draws, and the order in which a process reads them."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence, Sized
@@ -34,7 +34,7 @@ class Pick(NamedTuple):
 
 @dataclass(frozen=True)
 class Draws:
-    """How many scans an epoch of training draws from each of several data sets, and which.
+    """The number of scans that an epoch draws from each of several data sets, and the choice.
 
     The scans of all data sets are numbered consecutively. Each data set is passed through again and
     again, in a new order every time, and an epoch continues where the last one ended, so that all

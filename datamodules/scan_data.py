@@ -26,7 +26,7 @@ Part = Literal["train", "validation", "test", "predict"]
 
 @dataclass(frozen=True)
 class Loading:
-    """How scans are read and batched.
+    """Options for reading and batching scans.
 
     Attributes:
         batch_size: Scans in a batch.

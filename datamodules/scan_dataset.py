@@ -160,7 +160,7 @@ def view_in_window(
     number: int,
     read: Callable[[Frame], Scan],
 ) -> ViewedScan:
-    """What a network sees of a scan, with the scans around it where its view needs them.
+    """A network's view of a scan, with the scans around it if the view needs them.
 
     Args:
         view: The view.

@@ -1,4 +1,4 @@
-"""What users do to scans before they clean them: thin, shake, double, move, cut, scale, tilt.
+"""Augmentations that imitate users' changes to scans: thin, shake, double, move, cut, scale, tilt.
 
 A network that has met all of these in its training does not depend on any.
 """
@@ -53,7 +53,7 @@ def changed_as_by_users(scan: Scan, generator: np.random.Generator) -> Scan:
 
 
 def thinned(scan: Scan, generator: np.random.Generator) -> Scan:
-    """A scan of which points are missing at random."""
+    """A scan with points missing at random."""
     return _of_enough(scan, generator.random(len(scan)) < log_uniform(SHARE_KEPT, generator))
 
 
@@ -69,7 +69,7 @@ def shaken_along(scan: Scan, generator: np.random.Generator) -> Scan:
 
 
 def doubled(scan: Scan, generator: np.random.Generator) -> Scan:
-    """A scan of which half of the points, or all, are written twice, hardly apart."""
+    """A scan with half of its points, or all, written twice, hardly apart."""
     twice = np.flatnonzero(generator.random(len(scan)) < generator.choice([0.5, 1.0]))
     apart = generator.normal(0, log_uniform(APART, generator), len(twice))
     copies = along(scan.xyz[twice], apart)

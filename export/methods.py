@@ -71,7 +71,7 @@ def read_parameters(path: str | Path) -> tuple[str, dict[str, Any]]:
 
 
 def split_title(text: str) -> tuple[str, str]:
-    """What a method is called, and its name or file.
+    """The title of a method, and its name or file.
 
     Args:
         text: As a user writes it: the name or the file, and before it ``title=`` or nothing.
@@ -88,7 +88,7 @@ def method_names() -> list[str]:
 
 
 def method_hint(name: str) -> str:
-    """What a user should give in place of what is no method; without the full stop.
+    """The remedy for an unknown method, without the full stop.
 
     Args:
         name: What the user gave.

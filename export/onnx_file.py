@@ -196,7 +196,7 @@ def _traced(model: DerainingModule, spec: Spec) -> onnx.ModelProto:
 
 
 def _example(spec: Spec) -> ViewedScan:
-    """What the network sees of a small scan, for the exporter to follow through it.
+    """The network's inputs for a small scan, for the exporter to trace.
 
     No length may be 0 or 1, which it would take for constants, or that of another axis.
     """

@@ -24,7 +24,7 @@ THREADS = (1, 2)
 
 @dataclass(frozen=True)
 class Bounds:
-    """What an exported model may differ by from PyTorch on a scan.
+    """The permitted differences of an exported model from PyTorch on a scan.
 
     Attributes:
         difference: Largest difference of a logit, as a share of the scan's largest logit where
@@ -59,7 +59,7 @@ FINITE = Bounds(difference=None, flipped=None)
 
 @dataclass(frozen=True)
 class Case:
-    """How one scan came out.
+    """The comparison on one scan.
 
     Attributes:
         name: What is hard about the scan.
@@ -104,7 +104,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Proof:
-    """How an exported model compares with PyTorch on every scan tried.
+    """The comparison of an exported model with PyTorch on all scans.
 
     Attributes:
         cases: The scans, on each number of threads.
@@ -122,7 +122,7 @@ class Proof:
 
     @property
     def least_rain_iou(self) -> float | None:
-        """What the IoU of the rain must be; None where no case bounds it."""
+        """The required IoU of the rain; None if no case bounds it."""
         return max(filter(None, (case.bounds.rain_iou for case in self.cases)), default=None)
 
     @property

@@ -138,7 +138,7 @@ class RecordedDerainer(Method):
         yield from self._odd.get(judgement.scan, ())
 
     def as_dict(self) -> dict[str, Any]:
-        """What commands call the model, its threshold, and how many scans around one it sees."""
+        """The model's name, its threshold, and the number of scans that it sees around one."""
         return self.model.as_dict() | {"past": self.window.before, "delay": self.window.after}
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -205,7 +205,7 @@ class RecordedDerainer(Method):
         doubtful: NDArray[np.int64],
         others: Sequence[PlacedJudgement],
     ) -> RayEvidence | None:
-        """What the rays of other scans show at the doubtful points; None where none shows the same.
+        """Evidence of the rays of other scans at the doubtful points; None if no scan matches.
 
         Args:
             scan: The scan.

@@ -166,11 +166,11 @@ class Derainer(Method):
 
     @property
     def window(self) -> Window:
-        """How many scans before and after the one that it judges its view asks for."""
+        """Number of scans that its view needs before and after the one that it judges."""
         return self.view.window
 
     def depends_on(self, recording: Sequence[Frame]) -> Window:
-        """As many scans before and after the one that it judges as its view asks for."""
+        """The scans that its view needs before and after the one that it judges."""
         return self.window
 
     def fingerprint(self) -> str:
@@ -199,7 +199,7 @@ class Derainer(Method):
             >>> len(judgement.rain), derainer.waiting
             (820, 0)
 
-        A model whose view asks for scans after the one that it judges answers for an earlier frame,
+        A model whose view needs scans after the one that it judges answers for an earlier frame,
         as many frames back. One of another sequence, or after a gap, starts anew: call
         :meth:`flush` before it, or the frames that still wait are let go of.
 
@@ -252,7 +252,7 @@ class Derainer(Method):
         yield from outside_view(judgement.scan, judgement.judged, self.spec.data)
 
     def as_dict(self) -> dict[str, Any]:
-        """What commands call the model, and what it calls rain by."""
+        """The model's name, and its threshold."""
         return {"method": self.name, "threshold": self.spec.threshold}
 
     def __reduce__(self) -> tuple[type[Self], tuple[Any, ...], dict[str, Any]]:
@@ -338,7 +338,7 @@ def _refuse_other_network(session: Session, view: View, path: Path) -> None:
     if found != wanted or scores != [("float32", (2,))]:
         raise InputError(
             path,
-            f"its network takes {found} and gives {scores}, not as its Spec says {wanted} and "
+            f"its network takes {found} and returns {scores}, where its Spec requires {wanted} and "
             "two scores",
             "Export it with `derain export`.",
         )

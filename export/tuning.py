@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class LabelledNeighbourhoods:
-    """What filters see of a scan, and its truth: found once, and judged in every trial.
+    """The filters' view of a scan, and its truth: computed once, judged in every trial.
 
     Attributes:
         view: Its neighbourhoods, M points with as many neighbours as any trial looks at.
@@ -66,7 +66,7 @@ class LabelledNeighbourhoods:
 
 @dataclass(frozen=True)
 class Tuned:
-    """What tuning found.
+    """The result of tuning.
 
     Attributes:
         parameters: The parameters of the greatest IoU, by name.
@@ -97,7 +97,7 @@ def search_space(name: str) -> Mapping[str, Span]:
 
 
 def neighbours_to_find(name: str) -> int:
-    """How many neighbours of every point a search for a filter's parameters needs at most.
+    """The most neighbours of a point that a search for a filter's parameters needs.
 
     Args:
         name: One of ``FILTERS``.
@@ -242,7 +242,7 @@ def _agree_on_data(
 
 
 def distributions_of(name: str) -> "dict[str, optuna.distributions.BaseDistribution]":
-    """What the parameters of a filter are drawn from, by name.
+    """The distributions that the parameters of a filter are drawn from, by name.
 
     Args:
         name: One of ``FILTERS``.

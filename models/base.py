@@ -1,4 +1,4 @@
-"""What every derainer shares: its Spec, and how a step of training goes."""
+"""The base class of derainers: their Spec, and the step of training."""
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
@@ -157,7 +157,7 @@ class DerainingModule(MeasuredModule):
 
     @abstractmethod
     def configure_optimizers(self) -> OptimizerLRScheduler:
-        """What trains it, as Lightning takes it."""
+        """The optimiser and its schedule, for Lightning."""
 
     def begin_from(self, source: "DerainingModule") -> None:
         """Takes over the weights of a trained model, to be trained on.
@@ -265,7 +265,7 @@ class DerainingModule(MeasuredModule):
             agree_on_task(self, data, training=stage == "fit")
 
     def configure_callbacks(self) -> list[Callback]:
-        """What guards a training of any network, whoever makes the trainer."""
+        """Callbacks that guard a training of any network, with any trainer."""
         return [FiniteLoss(), Resumption()]
 
     def on_load_checkpoint(self, checkpoint: dict[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""What networks share that see neighbours in steps of the sensor's beams, and shells of range."""
+"""Shared parts of networks with neighbours in steps of the sensor's beams, and shells of range."""
 
 import torch
 from torch import Tensor
@@ -42,7 +42,7 @@ def asinh(steps: Tensor) -> Tensor:
 
 
 def farther_by(distance: Tensor, dot: Tensor, apart: Tensor) -> Tensor:
-    """How much farther neighbours are from the sensor: a difference of squares by the sum.
+    """Difference of ranges between neighbours: a difference of squares by the sum.
 
     The difference of two ranges would leave the rounding of both, which where beams lie close is no
     small part of a step.

@@ -1,4 +1,4 @@
-"""How every derainer is measured and logged: in validation, test and prediction."""
+"""Measurement and logging of derainers: in validation, test and prediction."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
@@ -179,7 +179,7 @@ class MeasuredModule(lightning.LightningModule, ABC):
             self._log_identical({"hp_metric": scores["iou"]})
 
     def _score(self, loss: Tensor) -> Tensor:
-        """What the best checkpoint is chosen by, given the loss of the validation scans."""
+        """The score that chooses the best checkpoint, given the loss of the validation scans."""
         if not self.LEARNS_FROM_LABELS:
             return -loss
         counts = self.metrics.counts().pooled()

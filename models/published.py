@@ -24,7 +24,7 @@ LOAD_ERRORS = (TypeError, ValueError, AttributeError, RuntimeError, ArithmeticEr
 
 
 class Published(ABC):
-    """A derainer whose weights somebody has published; ``derain import-weights`` asks for it."""
+    """A derainer with published weights, for ``derain import-weights``."""
 
     @classmethod
     @abstractmethod

@@ -1,4 +1,4 @@
-"""What derainers on range images share: the grid they see a scan through."""
+"""The base class of derainers on range images: their grid."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""What derainers that learn from labels share: their loss."""
+"""The base class of derainers that learn from labels: their loss."""
 
 import sys
 from collections.abc import Sequence
@@ -74,7 +74,7 @@ class SupervisedModule(DerainingModule):
             self.class_weight.copy_(weights ** self.hparams.get("balance", 1.0))
 
     def candidates_for(self, card: DataCard, scans: Sequence[Scan]) -> Candidates | None:
-        """Bounds that hold as much of the training scans' rain as ``candidates`` asks for.
+        """Bounds that hold as much of the training scans' rain as ``candidates`` states.
 
         Raises:
             InputError: ``candidates`` that is no share between 0 and 1.

@@ -1,4 +1,4 @@
-"""What is fuzzed: a reader, the inputs made for it, and what counts as a right result."""
+"""A fuzzed reader: its inputs, and the check of its results."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -65,7 +65,7 @@ class LabelledScan:
         truth: Its points by their own labels, as
             :attr:`derain.evaluation.counts.RainCounts.cells` for each title of a
             :class:`TruthRecord`; None where they are not measured.
-        issues: What is odd about it.
+        issues: Warnings about it.
         error: Why it has no labels; None where it has.
     """
 

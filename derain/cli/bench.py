@@ -20,9 +20,10 @@ a baseline: position and intensity, learnt from the training scans, all and none
 With --runtime, each model has a second row for that runtime, and derain prints how it differs from
 onnxruntime.
 Scoring runs all methods in one process, where filters share one neighbour search, or unit by unit
-in processes (--workers), shards or a Dask cluster, with the same figures: of more than --block
-scans derain keeps records in --out, what was stopped goes on, and `derain status` prints how far it
-is. Each method is then timed alone, in its own process, by the command that scores the last unit.
+in processes (--workers), shards or a Dask cluster, with the same figures. For more than --block
+scans derain keeps records in --out: a bench that was stopped resumes, and `derain status` prints
+its progress. Each method is then timed alone, in its own process, by the command that scores the
+last unit.
 """
 
 import argparse

@@ -5,8 +5,8 @@ r"""Makes a checkpoint of derain from published weights.
   derain import-weights salsanext SalsaNext_valid_best --stats semantickitti --data rehearse3d \
       --grid rehearse3d --out salsanext.ckpt
 
---data names the data card of what the weights were trained on, which states their classes, rain and
-licence; --stats the one whose mean and standard deviation their input was normalised by. Each is a
+--data names the data card of the training data, with their classes, rain and licence; --stats names
+the card whose mean and standard deviation normalised the network's input. Each is a
 packaged card or a YAML file. The published REHEARSE-3D weights of 3D-OutDet fit the statistics of
 WADS best (inferred); those of SalsaNext were trained with SemanticKITTI's. --grid names the grid of
 the range images that the weights were trained on.
@@ -60,7 +60,7 @@ def main(arguments: argparse.Namespace) -> int:
     data = stats if arguments.data is None else load_card(arguments.data)
     if not data.rain:
         raise InputError(
-            "--data", f"{data.name} has no rain that weights could know", "Say what theirs had."
+            "--data", f"{data.name} has no rain", "Give the card of the weights' training data."
         )
     model = published[name].from_published(
         read_state_dict(arguments.weights), data.normalised_as(stats), arguments.grid

@@ -1,4 +1,4 @@
-"""What ``derain info`` prints of a folder: scans and points by class and by rain rate."""
+"""Facts that ``derain info`` prints about a folder: scans and points by class and rain rate."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -31,7 +31,7 @@ FOLDER_NAMES: CardRestsOn = "names of folders"
 
 @dataclass(frozen=True)
 class FolderFacts:
-    """What is in a folder of scans.
+    """The contents of a folder of scans.
 
     Attributes:
         folder: The folder.
@@ -60,14 +60,14 @@ class FolderFacts:
 
     @property
     def total(self) -> Contents:
-        """What was counted at all rain rates together."""
+        """The counts of all rain rates together."""
         total = Contents()
         for contents in self.by_rain_rate.values():
             total.add(contents)
         return total
 
     def as_dict(self) -> dict[str, Any]:
-        """The same as JSON knows it."""
+        """The same as JSON-able primitives."""
         return {
             "folder": str(self.folder),
             "layout": self.folders,
@@ -206,7 +206,7 @@ def _layout(folder: Path, card: DataCard | None, stated: str | None) -> Layout |
 
 
 def _card(folder: Path, layout: Layout | None) -> tuple[DataCard | None, CardRestsOn]:
-    """The data card that a folder shows by itself, and by what."""
+    """The data card guessed for a folder, and the evidence for it."""
     if manifest_of(folder):
         return load_card("simulated"), "manifest"
     return (None if layout is None else card_by_folders(layout, "classes")), FOLDER_NAMES

@@ -1,7 +1,7 @@
 """Trains a network to take the rain out of a sensor's scans, from an unlabelled recording.
 
-The recording is consecutive scans in a folder. A teacher labels each point rain, not rain or not
-known; a network is trained on these labels, exported as one ONNX file and proved; a report
+The recording is consecutive scans in a folder. A teacher labels each point rain, not rain or
+unknown; a network is trained on these labels, exported as one ONNX file and proved; a report
 describes how far to trust it, with the commands that repeat each step.
 
   derain learn recording/ --out model.onnx
@@ -11,14 +11,14 @@ describes how far to trust it, with the commands that repeat each step.
   derain learn recording/ --out model.onnx --start mine.ckpt   go on from a model of yours
   derain learn recording/ --out model.onnx --rerun report.rrd  look at teacher and student
   derain learn drive.mcap --out model.onnx --topic /velodyne_points
-  derain run model.onnx more_scans/ --out cleaned              what it is for
+  derain run model.onnx more_scans/ --out cleaned              use the model
 
 The default teacher is the model that comes with derain, which sees the scans before and after each;
-the network begins with the weights of the same model. Where --model or --blind calls for another
-network, its weights are drawn at random. The teacher persistence goes by free space alone: solid
-things stay in their place, and drops do not. The report compares the two. Labels beside the scans
-are not read; with --card, they measure the finished model, for the record. Labels, runs and report
-go to a folder beside the model, which a second run clears.
+the network begins with the weights of the same model. If --model or --blind selects another
+network, its weights are random. The teacher persistence uses free space alone: solid things stay in
+their place, and drops do not. The report compares the two. Labels beside the scans are not read;
+with --card, they measure the finished model, for the record. Labels, runs and report go to a folder
+beside the model, which a second run clears.
 """
 
 import argparse
@@ -54,8 +54,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--teacher",
         default=DEFAULT,
         metavar="METHOD",
-        help="method that labels the scans: the model that comes with derain (%(default)s), persistence, "
-        "a filter such as crf, or a model of yours (.onnx)",
+        help="method that labels the scans: the model that comes with derain (%(default)s), "
+        "persistence, a filter such as crf, or a model of yours (.onnx)",
     )
     add_poses(parser)
     parser.add_argument("--epochs", type=count, help="passes over the scans (default: by model)")

@@ -58,7 +58,7 @@ def column_names(text: str) -> tuple[str, ...]:
 
 
 def file_named(*suffixes: str) -> Callable[[str], Path]:
-    """A file to write, with a suffix by which other commands know its kind.
+    """A file to write, with a suffix that other commands accept.
 
     Args:
         suffixes: The suffixes that it may have.

@@ -1,4 +1,4 @@
-"""What commands print, and the folders that they may write to."""
+"""Output of commands: lines, errors, exit codes, and the folders that they may write to."""
 
 import json
 import sys

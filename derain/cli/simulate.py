@@ -1,4 +1,4 @@
-"""Simulates a data set of rain, or lets it rain on clean scans.
+"""Simulates a data set of rain, or adds rain to clean scans.
 
 By default it simulates a rain facility in the layout of REHEARSE-3D: LiDAR, radar, both merged,
 labels, weather. Every sequence is another track: 60 % for training, 20 % each for validation and
@@ -12,15 +12,15 @@ test. Training needs three or more sequences; one is enough to look at.
   derain simulate --out country --layout country --sensor spinning_64 --no-radar
   derain simulate --out drive --layout street --speed 13 --traffic 8 --sensor spinning_64
 
-As in the real facility, only rain is near the sensor, and little else is as dim: rules of position
-or of intensity find it. The streets have boughs and bushes between the drops. The other layouts
-have many objects that look like drops: windows, nets, twigs, grass, and people near the sensor.
-With --speed the sensor drives along a street, without a radar; with --traffic cars and pedestrians
-move. derain then also writes poses.txt, and numbers moving objects in the upper 16 bits of the
-labels.
+As in the real facility, only rain is near the sensor, and little else is as dim, so that rules of
+position or of intensity find it. The streets have boughs and bushes between the drops. The other
+layouts have many objects that look like drops: windows, nets, twigs, grass, and people near the
+sensor. With --speed the sensor drives along a street, without a radar; with --traffic cars and
+pedestrians move. derain then also writes poses.txt, and numbers moving objects in the upper 16 bits
+of the labels.
 
-The sequences take the rain rates in turn; 0 is clean. A second call continues an interrupted run;
-`derain status` prints how far it is. To train on the data set:
+The sequences use the rain rates in turn; 0 is clean. A second call continues an interrupted run;
+`derain status` prints its progress. To train on the data set:
 
   derain fit --config outdet_simulated.yaml --data.root facility --data.make false
 
@@ -31,8 +31,8 @@ derain/simulation/worlds/world.yaml.
   derain simulate --out worlds --world --sequences 500
   derain fit --config relative_outdet_worlds.yaml --data.root worlds --data.make false
 
-Many machines make one data set, in a folder that all of them see: by --dask, or each by its shard.
-Whichever ends last completes manifest.json. Neither changes a byte.
+Many machines can make one data set in a folder that they share: with --dask, or one shard each. The
+last one to end completes manifest.json. The bytes stay the same.
 
   derain simulate --out worlds --world --sequences 100000 --shard 0/4
   derain status worlds
@@ -204,7 +204,7 @@ def _refuse(foreign: Iterable[str], arguments: argparse.Namespace, needs: str) -
 
 
 def _campaign(options: argparse.Namespace) -> "Campaign | WorldCampaign":
-    """What is simulated: sequences of tracks, or scans of worlds."""
+    """The campaign to simulate: sequences of tracks, or scans of worlds."""
     from derain.simulation.campaign import FACILITY_RAIN_RATES, Campaign, Drive, partition
     from derain.simulation.radar import Radar
     from derain.simulation.world import WorldCampaign

@@ -93,7 +93,7 @@ def shard(text: str) -> Shard:
 
 
 def shard_of(arguments: argparse.Namespace) -> Shard | None:
-    """The shard of the work that is done, of which it warns where nobody asked; None for all."""
+    """The shard of the work to do, with a warning if it comes from SLURM alone; None for all."""
     found: Shard | None = arguments.shard or Shard.of_environment()
     if found is not None and found.of_array:
         warn(
@@ -104,7 +104,7 @@ def shard_of(arguments: argparse.Namespace) -> Shard | None:
 
 
 def division_of(arguments: argparse.Namespace) -> Division:
-    """How the arguments divide the work.
+    """The division of the work by the arguments.
 
     Raises:
         InputError: Options that exclude each other.
@@ -166,7 +166,7 @@ def with_given_poses(source: Source, arguments: argparse.Namespace) -> Source:
 
 
 def odometry_of(arguments: argparse.Namespace) -> Odometry | None:
-    """What finds the poses in the process that does a unit; None where they are not to be found."""
+    """The odometry for the process that does a unit; None if poses are not to be computed."""
     return Odometry(arguments.threads) if arguments.poses == ODOMETRY else None
 
 

@@ -75,7 +75,7 @@ def add_weather(parser: argparse.ArgumentParser) -> None:
 
 
 def weather_options(arguments: argparse.Namespace) -> WeatherOptions:
-    """How the arguments have the weather measured.
+    """The weather options of the arguments.
 
     Raises:
         InputError: Levels that cannot be, or a dry reference that cannot be read.
@@ -144,7 +144,7 @@ def weather_table(path: Path | None) -> Iterator[list[Sequence[object]]]:
 def _dry_reach(
     reference: Path, columns: Sequence[str], warning: Threshold, error: Threshold
 ) -> Visibility:
-    """The reach of the dry reference, of which no more than DRY_SCANS scans are read.
+    """The reach of the dry reference; at most DRY_SCANS of its scans are read.
 
     Raises:
         InputError: It cannot be read, or does not reach the end of any level.

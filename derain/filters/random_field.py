@@ -86,8 +86,8 @@ def _turn_in_waves(
     while len(turned):
         column, dependent = dependents.of(turned)
         votes[column, dependent] = at_least[column, dependent]
-        asked = np.unique(dependent[is_rain[open_[dependent]]])
-        turned = open_[asked[_total(own[asked], votes[:, asked]) <= 0]]
+        affected = np.unique(dependent[is_rain[open_[dependent]]])
+        turned = open_[affected[_total(own[affected], votes[:, affected]) <= 0]]
         is_rain[turned] = False
 
 

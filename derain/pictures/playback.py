@@ -246,18 +246,15 @@ def caption(frame: Frame, scan: Scan, labels: Labels | None, held_out: bool) -> 
     meanings = "\n".join(
         f"- {COLOUR_NAMES[colour]}: {meaning}" for meaning, colour in coloured.items()
     )
-    return f"{which}\n\n{meanings}\n\n{_known_by(labels)} {PROBABILITY_TEXT}.\n"
+    return f"{which}\n\n{meanings}\n\n{_meaning_of_rain(labels)} {PROBABILITY_TEXT}.\n"
 
 
-def _known_by(labels: Labels | None) -> str:
+def _meaning_of_rain(labels: Labels | None) -> str:
     if labels is None:
         return "No labels: the true rain is unknown."
     if not labels.card.unknown:
         return f"Rain means rain by the {labels.name}."
-    return (
-        f"Rain is what the {labels.name} calls rain; in its own view, yellow is what it does not "
-        "know."
-    )
+    return f"Rain means rain by the {labels.name}; in its own view, undecided points are yellow."
 
 
 def _escaped(text: str) -> str:

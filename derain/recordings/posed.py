@@ -35,7 +35,7 @@ class Odometry:
     threads: int = 0
 
     def __call__(self, frames: Sequence[Frame]) -> list[tuple[Frame, list[ScanIssue]]]:
-        """Each frame with its pose, as :func:`with_poses` gives it, and what is odd about it."""
+        """Each frame with its pose, as :func:`with_poses` gives it, and warnings about it."""
         issues: list[list[ScanIssue]] = []
 
         def note(frame: Frame, registration: Registration) -> None:

@@ -186,7 +186,7 @@ class Sensor(Settings):
         return azimuth, (highest + lowest) / 2 + offsets + swing
 
     def beam_times(self) -> Floats:
-        """When each beam is sent, float64 (rows · columns,), seconds after the scan begins.
+        """Time of each beam, float64 (rows · columns,), seconds after the scan begins.
 
         Columns follow each other from the left to the right, as of a sensor that spins clockwise.
         """

@@ -238,7 +238,7 @@ def require_probabilities(method: Method, source: Source) -> None:
     if not method.gives_probabilities:
         raise InputError(
             "--probability",
-            f"{method.as_dict()['method']} says which points are rain, and not how probably",
+            f"{method.as_dict()['method']} returns which points are rain, without probabilities",
             "Leave it out, or take a model or persistence.",
         )
     for frame in {frame.suffix: frame for frame in reversed(source)}.values():

@@ -36,7 +36,7 @@ class CleanedScan:
         not_known: Number of valid points of which the method is not sure; None for a method that
             does not report doubt.
         milliseconds: Time of each stage.
-        warnings: What is odd about the scan.
+        warnings: Warnings about the scan.
         weather: Its weather; None unless every scan is measured.
     """
 
@@ -70,7 +70,7 @@ class ScanOutcome:
 
     Attributes:
         frame: The scan.
-        issues: What is odd about it.
+        issues: Warnings about it.
         cleaned: What was done to it; None where it could not be cleaned.
         seconds: When it was taken, seconds; None where that is not known.
         packed: The weather that it shows, as text; None where it was not measured.

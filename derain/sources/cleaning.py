@@ -66,7 +66,7 @@ class CleaningObserver:
         """Called for each judged scan before it is written, where no records are kept."""
 
     def noticed(self, scan: str, odd: list[ScanIssue]) -> None:
-        """Called for each judged scan with what is odd about it."""
+        """Called for each judged scan with warnings about it."""
 
     def cleaned(self, outcome: ScanOutcome) -> None:
         """Called for each scan that is written."""

@@ -41,7 +41,7 @@ class Judgement:
 
     @property
     def answered(self) -> NDArray[np.bool_]:
-        """True for rows that were judged, and for sure where the method knows doubt, bool (N,)."""
+        """True for rows that were judged, and with certainty, bool (N,)."""
         return self.judged if self.known is None else self.judged & self.known
 
     @property

@@ -140,9 +140,9 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
         if share > self.most_removed:
             error = InputError(
                 frame.name,
-                f"left whole, for {share:.1%} of its valid points are called rain, where the "
-                f"heaviest rain has {HEAVIEST_RAIN:.0%}",
-                "See whether the method suits sensor and unit of intensity, or raise "
+                f"left whole: {share:.1%} of its valid points are called rain, and the heaviest "
+                f"rain has {HEAVIEST_RAIN:.0%}",
+                "Check that the method suits the sensor and its unit of intensity, or raise "
                 "--most-removed.",
             )
             return ScanOutcome(frame, issues, error=error)

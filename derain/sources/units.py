@@ -58,8 +58,8 @@ class Division:
             source: The scans.
             folder: The folder of the results.
         """
-        asked = self.keep_records or self.anew or self.shard is not None
-        return asked or len(source) > self.block or Job.is_begun(folder)
+        requested = self.keep_records or self.anew or self.shard is not None
+        return requested or len(source) > self.block or Job.is_begun(folder)
 
     def begin(
         self, folder: Place, options: Mapping[str, Any], units: "list[FrameUnit]"

@@ -13,12 +13,12 @@ from derain.scan import LARGEST_COORDINATE, Scan
 # Source: tier4/nebula, `dual_return_distance_threshold`.
 LEAST_APART = 0.1
 
-# What drivers call the number of a return within its ray, and how many the ray has.
+# Drivers' names for the number of a return within its ray, and for the number of its returns.
 NUMBER_NAMES = ("return_number", "return_id", "return_index", "echo")
 COUNT_NAMES = ("number_of_returns", "return_count", "num_returns")
 
 # Types of returns in dual mode, those in front and those behind: first or last of the two, each
-# either the weaker or the stronger one. Two numberings are about, which these pairs tell apart.
+# either the weaker or the stronger one. There are two numberings, which these pairs distinguish.
 # Source: tier4/nebula, `ReturnType`; autowarefoundation/autoware.universe, `ReturnType`.
 NEBULA = ((4, 9), (5, 10))
 NEBULA_TELLS = frozenset({9, 10})
@@ -32,12 +32,12 @@ class StatedReturns:
 
     Attributes:
         column: Name of the column.
-        number: The same for returns that are not of one ray together; of two returns of one ray,
-            each has its own, int64 (N,); -1 for the only return of a ray.
-        nearer: Where it says that a return of the same ray lies behind, bool (N,).
-        farther: Where it says that a return of the same ray lies in front, bool (N,).
-        other_range: Range of the other return, where that is no row of its own, float32 (N,),
-            metres; NaN where it is one or there is none.
+        number: Number of the return within its ray, int64 (N,); two returns of one ray have
+            different numbers. -1 for the only return of a ray.
+        nearer: True if a return of the same ray lies behind by the column, bool (N,).
+        farther: True if a return of the same ray lies in front by the column, bool (N,).
+        other_range: Range of the other return if that has no row of its own, float32 (N,),
+            metres; NaN if it has one or there is none.
     """
 
     column: str
@@ -50,17 +50,17 @@ class StatedReturns:
 def stated_returns(scan: Scan) -> StatedReturns | None:
     """Reads the returns of a scan from its columns.
 
-    A column by which no ray has two says nothing: writers fill in 1 where they do not know.
+    A column by which no ray has two returns is ignored: writers fill in 1 for unknown values.
 
     Args:
-        scan: The scan. Known are ``return_number`` (or ``return_id``, ``return_index``, ``echo``)
-            with or without ``number_of_returns``, counted from the sensor outwards; ``bit_fields``,
-            in which LAS has both; ``return_type`` of Nebula and Autoware; bits 4 and 5 of Livox's
-            ``tag``; and ``range2`` beside ``range``, by which Ouster states a second return in the
-            row of the first.
+        scan: The scan. Supported columns: ``return_number`` (or ``return_id``, ``return_index``,
+            ``echo``) with or without ``number_of_returns``, counted from the sensor outwards;
+            ``bit_fields``, in which LAS has both; ``return_type`` of Nebula and Autoware; bits 4
+            and 5 of Livox's ``tag``; and ``range2`` beside ``range``, by which Ouster states a
+            second return in the row of the first.
 
     Returns:
-        None where no column tells.
+        None if no column holds returns.
     """
     columns = {
         name.lower(): column
@@ -155,7 +155,7 @@ def _of_second_ranges(scan: Scan, columns: Columns) -> StatedReturns | None:
 def _counted(scan: Scan, name: str, number: NDArray[np.int64]) -> StatedReturns | None:
     """Returns by numbers from 0 or 1, if the number of returns of each ray is not known.
 
-    The first return may be the only one of its ray: whether it is, its direction has to tell.
+    The first return may be the only one of its ray; directions have to decide that.
     """
     numbers = number[scan.valid]
     if not len(numbers) or numbers.min() == numbers.max():
@@ -165,7 +165,7 @@ def _counted(scan: Scan, name: str, number: NDArray[np.int64]) -> StatedReturns 
 
 
 def _whole(column: NDArray[Any]) -> NDArray[np.int64]:
-    """A column as whole numbers; what is none is -1."""
+    """A column as whole numbers; values that are not finite or too large are -1."""
     if column.dtype.kind != "f":
         return column.astype(np.int64)
     return np.where(np.abs(column) < 2**31, column, -1).astype(np.int64)

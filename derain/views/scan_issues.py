@@ -73,7 +73,7 @@ def missing_intensity(
     scan: Scan,
     consequence: str = "nothing can be found without; name its column, or take default or dror",
 ) -> Iterator[ScanIssue]:
-    """True if a scan lacks the intensity that a method needs.
+    """Yields an issue if a scan lacks the intensity that a method needs.
 
     Args:
         scan: The scan.
@@ -85,7 +85,7 @@ def missing_intensity(
 
 
 def intensity_unlike_training(scan: Scan, mean: float, unit: str, data: str) -> Iterator[ScanIssue]:
-    """True if a scan's intensities are of another unit than a model's training data.
+    """Yields an issue if a scan's intensities have another unit than a model's training data.
 
     Args:
         scan: The scan.
@@ -108,7 +108,7 @@ def intensity_unlike_training(scan: Scan, mean: float, unit: str, data: str) -> 
 
 
 def intensity_of_another_scale(scan: Scan, expected: float, whose: str) -> Iterator[ScanIssue]:
-    """True if a scan's intensities have another full scale than expected.
+    """Yields an issue if a scan's intensities have another full scale than expected.
 
     Args:
         scan: The scan.
@@ -131,11 +131,11 @@ def intensity_of_another_scale(scan: Scan, expected: float, whose: str) -> Itera
 
 
 def outside_view(scan: Scan, judged: NDArray[np.bool_], data: str) -> Iterator[ScanIssue]:
-    """True if much of a scan lies outside what a model sees.
+    """Yields an issue if much of a scan lies outside the field of view of a model.
 
-    Only who judged the scan can say: to project it once more would take as long as the view. A
-    bench does not, whose methods give no more than what they call rain, and whose recall counts
-    the rain that they do not see as missed.
+    The caller passes the judged rows: to project the scan again would take as long as the view. A
+    bench does not call this: its methods return only the rain, and its recall counts the rain
+    outside the view as missed.
 
     Args:
         scan: The scan.
@@ -152,7 +152,7 @@ def outside_view(scan: Scan, judged: NDArray[np.bool_], data: str) -> Iterator[S
 
 
 def much_removed(share: float) -> Iterator[ScanIssue]:
-    """True if a method calls more of a scan rain than rain ever was.
+    """Yields an issue if a method calls more of a scan rain than in any rain.
 
     Args:
         share: Share of the points that can be judged which it calls rain.
@@ -160,19 +160,19 @@ def much_removed(share: float) -> Iterator[ScanIssue]:
     if share > MOST_RAIN:
         yield ScanIssue(
             f"more than {MOST_RAIN:.0%} called rain",
-            f"{share:.0%} of the points are called rain, where the heaviest rain has "
+            f"{share:.0%} of the points are called rain, and the heaviest rain has "
             f"{HEAVIEST_RAIN:.0%}: the method may not suit the sensor",
         )
 
 
 def no_points(scan: Scan) -> Iterator[ScanIssue]:
-    """True if a scan holds no points: by its format that may be, but it was hardly meant."""
+    """Yields an issue if a scan holds no points, which is valid but hardly intended."""
     if not len(scan):
         yield ScanIssue("no points", "it holds no points: the file may be a copy that failed")
 
 
 def left_out(scan: Scan) -> Iterator[ScanIssue]:
-    """True if a scan's file holds what is not written with the cleaned scan."""
+    """Yields an issue if a scan's file has parts that are not written with the cleaned scan."""
     if isinstance(scan.header, PartialHeader) and scan.header.left_out:
         yield ScanIssue(
             "parts of the file that are not written",

@@ -214,7 +214,7 @@ def _compare(config: DemoConfig, data: ScanData, steps: Steps) -> Bench:
 
 
 class Watch(CleaningObserver):
-    """Warns of what is odd about scans, and finds what of the example's rain is removed.
+    """Prints warnings about scans, and counts the removed rain of the example.
 
     Args:
         labels: Folder of the labels that the scans get.
@@ -229,7 +229,7 @@ class Watch(CleaningObserver):
         self._notices = Notices()
 
     def noticed(self, scan: str, odd: list[ScanIssue]) -> None:
-        """Warns of what is odd about a scan."""
+        """Prints warnings about a scan."""
         self._notices.warn(scan, odd)
 
     def cleaned(self, outcome: ScanOutcome) -> None:

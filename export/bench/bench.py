@@ -93,7 +93,7 @@ class Bench:
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is timed, and the seed.
+    """The amount of timing, and the seed.
 
     Attributes:
         threads: Threads of views and networks; 0 takes every core this process may use.
@@ -167,11 +167,11 @@ def bench(
             one that cannot be read or has no labels. The row of a method that fails states so.
     """
     card = card if isinstance(card, DataCard) else load_card(card)
-    asked = card.deduplicate if distinct is None else distinct
+    deduplicate = card.deduplicate if distinct is None else distinct
 
     def labelled(given: GivenScans) -> LabelledFrames:
         frames = source_of(given, columns)
-        return LabelledFrames(card, frames, intensity_scale, asked, rain_rates or {})
+        return LabelledFrames(card, frames, intensity_scale, deduplicate, rain_rates or {})
 
     learn_from = None if train is None else labelled(train).truths
     rows = bench_entries(methods, learn_from, Runtime(runtime, precision))
@@ -355,7 +355,7 @@ class Counting(ValueWork[FrameUnit]):
 
 
 def _options(methods: Sequence[BenchEntry], data: LabelledFrames, block: int) -> dict[str, Any]:
-    """What the counts depend on but the scans."""
+    """The options that the counts depend on besides the scans."""
     return {
         **shared_options("bench", data.frames, block),
         **{f"method {method.title}": method.fingerprint for method in methods},

@@ -1,4 +1,4 @@
-"""What a bench compares: models, filters, and the baselines that every method has to beat.
+"""The entries of a bench: models, filters, and the baselines that every method has to beat.
 
 Nothing here loads torch, so that a process that measures a method's memory holds little else.
 """

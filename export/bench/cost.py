@@ -22,7 +22,7 @@ from derain.system.workers import without_main_module, worker_pool
 
 @dataclass(frozen=True)
 class Timing:
-    """How methods are timed.
+    """Options for timing methods.
 
     Attributes:
         frames: Scans to time them on, one or more.

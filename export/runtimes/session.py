@@ -23,7 +23,7 @@ DEFAULT_RUNTIME, FLOAT32_PRECISION = "onnxruntime", "float32"
 
 @dataclass(frozen=True)
 class TensorType:
-    """What a network takes or gives under one name.
+    """An input or output of a network: its type and shape.
 
     Attributes:
         dtype: NumPy's name of the type of its numbers.
@@ -90,7 +90,7 @@ class Session(ABC):
 
     @classmethod
     def cannot_run(cls, file: ModelFile, error: Exception) -> InputError:
-        """What to raise of a graph that the runtime does not take."""
+        """The error for a graph that the runtime does not accept."""
         lines = [line for line in str(error).splitlines() if line.strip()]
         # OpenVINO begins with lines on the place in its own sources where it stopped.
         reason = next((line for line in lines if not line.startswith("Exception from")), "")
@@ -103,7 +103,7 @@ class Session(ABC):
 
 @dataclass(frozen=True)
 class Runtime:
-    """What runs a network, and the precision that it computes in.
+    """A runtime of networks, and the precision that it computes in.
 
     Attributes:
         name: One of ``RUNTIMES``.
@@ -143,7 +143,7 @@ class Runtime:
 
     @property
     def is_default(self) -> bool:
-        """True if it is what runs models where nobody asks for another."""
+        """True if it runs models by default."""
         return self == Runtime()
 
     def __str__(self) -> str:

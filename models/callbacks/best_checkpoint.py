@@ -50,7 +50,7 @@ class BestCheckpoint(ModelCheckpoint):
 
     @property
     def state_key(self) -> str:
-        """Where checkpoints keep the state: as Lightning's, for a run may go on from its own."""
+        """The key of its state in checkpoints: Lightning's, so that old runs can be resumed."""
         return super().state_key.replace(type(self).__qualname__, ModelCheckpoint.__qualname__, 1)
 
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""What TensorBoard shows of a training: pictures of scans and of errors, and a page of charts."""
+"""TensorBoard's view of a training: pictures of scans and of errors, and a page of charts."""
 
 from typing import Any
 
@@ -96,7 +96,7 @@ class ScanPanels(lightning.Callback):
         self.left = 0
 
     def on_validation_epoch_start(self, trainer: lightning.Trainer, *_: Any) -> None:
-        """Starts counting anew; the order of validation scans is fixed."""
+        """Restarts counting; the order of validation scans is fixed."""
         draws = self.epochs.begins(trainer) and trainer.is_global_zero
         self.left = self.scans if draws else 0
 
@@ -209,7 +209,7 @@ def errors_by_name(measured: RainCounts) -> dict[str, float]:
 
 
 def _of_curve(points: OperatingPoints) -> tuple[NDArray[np.float64] | NDArray[np.int64], ...]:
-    """What TensorBoard wants of a curve, at thresholds from 0 to 1 in equal steps."""
+    """A curve in TensorBoard's form, at thresholds from 0 to 1 in equal steps."""
     even = points.among(CURVE_THRESHOLDS)
     hits, false = even.true_positive, even.false_positive
     negatives, misses = points.other - false, points.rain - hits

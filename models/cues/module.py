@@ -1,4 +1,4 @@
-"""Cues: what geometry and brightness each know of a point, weighed by one fusion."""
+"""Cues: evidence of rain from geometry and from brightness, weighed by one fusion."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any, ClassVar
@@ -41,7 +41,7 @@ class CueFusion(SupervisedModule):
         neighbours: k, the size of a neighbourhood, the point itself included; at least 9.
         width: Features of a point.
         of_neighbour: Features of each neighbour, of where it is.
-        opinion: What a point tells those that it is a neighbour of.
+        opinion: Number of features that a point passes to those that it is a neighbour of.
         context: Features of what a scan holds at some range.
         fusion: Features of a point in the layers that weigh the cues.
         without_intensity: Added to the log-odds of scans without intensities; chosen after the
@@ -134,7 +134,7 @@ class CueFusion(SupervisedModule):
 
 
 def _scans_of(batch: Batch) -> Iterator[dict[str, Tensor]]:
-    """What the network takes of each scan of a batch; all of them share the points."""
+    """Splits a batch into the network's inputs for each scan; all of them share the points."""
     shared = {name: batch.inputs[name] for name in ("points", "cell")}
     split = {name: batch.split(batch.inputs[name]) for name in ("distances", "neighbours")}
     for scan in range(len(batch.cells)):

@@ -225,13 +225,13 @@ class LiSnowNet(DerainingModule, Published):
         self.adopt(replace(self.spec, rule=rule.as_dict()))
 
     def _image_of(self, scan: Scan) -> tuple[Tensor, Tensor]:
-        """What :meth:`forward` takes of a scan."""
+        """The input of :meth:`forward` for a scan."""
         inputs = self.spec.make_view()(scan).inputs()
         image, valid = (torch.from_numpy(inputs[name]) for name in ("image", "valid"))
         return image.to(self.device), valid.to(self.device)
 
     def _changes(self, image: Tensor, valid: Tensor) -> NDArray[np.float32]:
-        """What the network changes of the returns that the rule's limits leave, float32 (M,)."""
+        """Changes by the network at the returns within the rule's limits, float32 (M,)."""
         seen = cube_roots(image, self.selection)
         changes = denoising_change(seen, self.network(seen, valid))
         return changes[valid & may_be_rain(image, self.selection)].cpu().numpy()

@@ -204,7 +204,7 @@ def varies(image: Tensor) -> Tensor:
 
 
 def published_key(name: str) -> str:
-    """Where one of our parameters stands in the published state_dict."""
+    """The key of one of our parameters in the published state_dict."""
     for ours, published in PUBLISHED_WORDS.items():
         name = name.replace(ours, published)
     return name

@@ -1,4 +1,4 @@
-"""Which returns LiSnowNet calls rain: a threshold on what denoising changed, and three limits."""
+"""LiSnowNet's selection of rain: a threshold on the change by denoising, and three limits."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
@@ -127,7 +127,7 @@ class SelectionRule:
 
 
 def cube_roots(image: Tensor, rule: SelectionRule) -> Tensor:
-    """What the network sees: cube roots of range and of intensity, in 0..1, float (B, 2, H, W).
+    """The input of the network: cube roots of range and of intensity, in 0..1, float (B, 2, H, W).
 
     Args:
         image: Range (m), z (m) and intensity (the data's unit), float (B, 3, H, W).
@@ -161,7 +161,7 @@ def rain_logits(
 
 
 def denoising_change(seen: Tensor, denoised: Tensor) -> Tensor:
-    """What denoising changed: of range, times that of intensity cubed, float (B, 1, H, W)."""
+    """The change by denoising: of range, times that of intensity cubed, float (B, 1, H, W)."""
     of_range, of_intensity = (denoised - seen).split(1, dim=1)
     return of_range * of_intensity**3
 

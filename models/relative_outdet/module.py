@@ -42,7 +42,7 @@ class RelativeOutDet(SupervisedModule):
         neighbours: k, the size of a neighbourhood, the point itself included; at least 4.
         width: Features of a point.
         of_neighbour: Features of each neighbour, of where it is.
-        opinion: What a point tells those that it is a neighbour of.
+        opinion: Features that a point passes to the points that it is a neighbour of.
         context: Features of what a scan holds at some range; 0 leaves that out.
         learning_rate: Of AdamW, where it is highest.
         weight_decay: Of AdamW.

@@ -146,7 +146,7 @@ def test_rays_of_two_returns_are_counted_and_by_labels_what_lies_behind_rain(
     rays, dual = len(np.unique(recording.ray)), int(nearer.sum())
     met = int((nearer & (recording.ray % 2 == 0)).sum())
     counted = {
-        "told by": "directions",
+        "found by": "directions",
         "rays": rays,
         "with two returns": dual,
         "share": round(dual / rays, 4),

@@ -313,9 +313,7 @@ def test_a_scan_that_would_lose_too_much_is_left_whole(
     outcome = run_derain("run", "ror", scans, "--out", out, *options)
     assert outcome.code == 2
     refused, summary = outcome.err.splitlines()[-2:]
-    assert refused.startswith(
-        f"derain: {scans / '000002.bin'}: left whole, for 100.0% of its valid"
-    )
+    assert refused.startswith(f"derain: {scans / '000002.bin'}: left whole: 100.0% of its valid")
     assert summary == "derain: 1 of 3 scans could not be cleaned"
     assert {path.stem for path in out.iterdir()} == {"000001", "000003"}
 

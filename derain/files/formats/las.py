@@ -134,7 +134,7 @@ class Las(Format):
 
 @contextmanager
 def _panics_as_errors() -> Iterator[None]:
-    """What laspy's library in Rust raises on some damaged data is not even an Exception."""
+    """Converts panics of laspy's Rust library, which are no Exception, to errors."""
     try:
         yield
     except BaseException as error:

@@ -154,7 +154,7 @@ def draw_particles(
 
 
 def _by_nearest(drawn: Particles, drawn_for: Ints, stretch: Stretch, beams: OpenBeams) -> Bools:
-    """Which particles were drawn for the nearest of the beams that they could be drawn for."""
+    """True for particles that were drawn for the nearest of their possible beams."""
     if not len(drawn_for):
         return np.empty(0, np.bool_)
     nearest = beams.nearest(drawn.place)
