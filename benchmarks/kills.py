@@ -69,7 +69,7 @@ class Victim:
         arguments: Of the command line.
         folder: Where it ran undisturbed.
         seconds: How long it takes undisturbed.
-        counts: What became of it, by column of the table.
+        counts: Its outcome, by column of the table.
     """
 
     arguments: Sequence[str | Path]
@@ -122,7 +122,7 @@ def kill_once(victim: Victim, generator: random.Random, folder: Path, again: boo
         victim: The command.
         generator: Where moment and signal come from.
         folder: An empty folder to run it in.
-        again: Whether it was finished there before.
+        again: True if it was finished there before.
     """
     if again:
         shutil.copytree(victim.folder / "out", folder / "out")

@@ -45,14 +45,14 @@ def scan_loader(
 
     Args:
         source: The scans, with their labels where they have any.
-        part: What they are read for. Training has a new order and augmentation every epoch: call
-            the sampler's ``set_epoch``, as a trainer does. The other parts are read in order and
+        part: Part that they are read for. Training has a new order and augmentation every epoch:
+            call the sampler's ``set_epoch``, as a trainer does. The other parts are read in order and
             unchanged; for prediction without labels and with all rows.
-        task: What model and data agreed on.
-        loading: How the scans are read and batched. The source itself knows the columns of files.
-        processes: How many processes share the scans.
-        process: Which of them this is.
-        draws: Which scans an epoch of training draws; None draws each once.
+        task: Agreement of model and data.
+        loading: Options for batching scans. The source has the columns of files.
+        processes: Number of processes that share the scans.
+        process: Number of this process.
+        draws: The scans that an epoch of training draws; None draws each once.
 
     Raises:
         InputError: Labels missing where they are needed; or a network that sees several scans,

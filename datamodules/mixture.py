@@ -50,7 +50,7 @@ class Mixture(ScanDataModule):
         scans_per_epoch: Scans that an epoch of training draws; by default as many as all parts have
             together. A part with fewer scans than its share repeats them.
         measured: Names of the parts that are validated, tested and predicted; by default all.
-        loading: How the scans are batched.
+        loading: Options for batching scans.
 
     Raises:
         InputError: No parts, or none with rain; a weight that is not greater than 0; the name of no

@@ -22,8 +22,8 @@ class Pick(NamedTuple):
     Attributes:
         number: Its number among the scans of its part.
         epoch: The epoch that it is read in.
-        measured: Whether the network's answer is counted or written.
-        again: How often it was drawn before in that epoch.
+        measured: True if the network's answer is counted or written.
+        again: Number of times that it was drawn before in that epoch.
     """
 
     number: int
@@ -113,9 +113,9 @@ class TrainingOrder(DistributedSampler[Pick]):
     Args:
         scans: The scans.
         seed: Seed of the run.
-        processes: How many processes share the scans.
-        process: Which of them this is.
-        draws: Which of the scans an epoch draws; None draws each once.
+        processes: Number of processes that share the scans.
+        process: Number of this process.
+        draws: The scans that an epoch draws; None draws each once.
     """
 
     def __init__(
@@ -155,8 +155,8 @@ class MeasuringOrder(DistributedSampler[Pick]):
     Args:
         scans: The scans.
         batch_size: Scans in a batch.
-        processes: How many processes share the scans.
-        process: Which of them this is.
+        processes: Number of processes that share the scans.
+        process: Number of this process.
     """
 
     def __init__(self, scans: "ScanDataset", batch_size: int, processes: int, process: int) -> None:

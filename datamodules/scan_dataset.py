@@ -35,7 +35,7 @@ class ScanDataset(Dataset[Sample | InputError]):
     Args:
         frames: The frames.
         read: Reads the scan of a frame, as the network sees it.
-        view: What the network sees.
+        view: The network's view.
         reader: Reads scans as they are in their files; its data card names the labels of rain.
         augmentation: Changes each scan newly every epoch; None changes nothing.
         seed: Seed of the run; with epoch and scan it determines the augmentation.
@@ -76,7 +76,7 @@ class ScanDataset(Dataset[Sample | InputError]):
         """Reads some of the scans, spread evenly, as they are in their files.
 
         Args:
-            most: How many at most.
+            most: The largest number.
 
         Raises:
             InputError: A scan that cannot be read.

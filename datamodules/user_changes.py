@@ -116,7 +116,7 @@ def along(xyz: NDArray[np.float32], metres: NDArray[np.float64]) -> NDArray[np.f
 
     Args:
         xyz: Positions in the sensor's frame, none at the origin, float32 (N, 3), metres.
-        metres: How far, float64 (N,).
+        metres: Distances, float64 (N,).
     """
     return (xyz + _rays(xyz) * metres[:, None]).astype(np.float32)
 

@@ -18,9 +18,9 @@ class Worlds(SimulatedDataModule):
     Args:
         root: Folder of the data set.
         campaign: The simulation, run where the folder does not hold its result.
-        make: Whether to run it; False takes what ``derain simulate --world`` wrote there.
+        make: True to run it; False takes what ``derain simulate --world`` wrote there.
         workers: Processes that simulate; 0 takes one per core.
-        loading: How the scans are read and batched.
+        loading: Options for reading and batching scans.
 
     Raises:
         InputError: Nothing is to be made, and there is no simulated data set in the folder.

@@ -25,8 +25,8 @@ class InputError(ValueError):
 
     Args:
         subject: The input: a file, a folder or an option.
-        reason: What is wrong with it.
-        remedy: What the user can do.
+        reason: The fault of the input.
+        remedy: The step that the user can take.
     """
 
     def __init__(self, subject: str | Path, reason: str, remedy: str) -> None:

@@ -45,7 +45,7 @@ class Spec:
         data: Name of the training data.
         licence: Licence of the training data.
         candidates: Bounds outside which it calls nothing rain; None where it judges every point.
-        training: What it was trained on, by `derain.sources.training_record`: names of
+        training: Training data, by `derain.sources.training_record`: names of
             sequences, fingerprints of scans. Empty where that is not known.
         schema: Version of this layout.
     """
@@ -75,7 +75,7 @@ class Spec:
         """Reads a Spec back. It is not trusted: every value is looked at before it is used.
 
         Args:
-            content: What :meth:`as_dict` gave, of this derain or of an earlier one: what has a
+            content: A result of :meth:`as_dict`, of this derain or of an earlier one: what has a
                 default may be missing.
             source: The file it was found in, for messages.
 

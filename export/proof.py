@@ -62,17 +62,17 @@ class Case:
     """The comparison on one scan.
 
     Attributes:
-        name: What is hard about the scan.
+        name: The difficulty of the scan.
         points: Cells that the network judged: points, or pixels.
         threads: Threads of the runtime.
         difference: Largest difference of a logit from PyTorch's, as a share of the scan's largest
             logit where that is above 1.
         flipped: Cells on the other side of the threshold.
-        finite: Whether every logit is finite.
+        finite: True if every logit is finite.
         both: Cells with a return that both call rain.
         either: Cells with a return that one or both call rain.
-        bounds: What it may differ by.
-        runtime: What ran the exported model, with its precision where that is not float32.
+        bounds: Permitted differences.
+        runtime: Runtime of the exported model, with its precision where that is not float32.
     """
 
     name: str
@@ -197,8 +197,8 @@ def prove(
         forward: The network in evaluation mode, from raw inputs to logits.
         model: The exported file.
         scans: Names and scans.
-        bounds: What the two may differ by.
-        runtime: What runs the exported model.
+        bounds: Permitted differences.
+        runtime: Runtime of the exported model.
     """
 
     def expect(view: ViewedScan) -> NDArray[np.float32]:

@@ -65,7 +65,7 @@ class RecordedDerainer(Method):
         [820]
 
     Args:
-        model: What judges a scan alone.
+        model: Model that judges a scan alone.
         past: Scans before the one that is judged.
         delay: Scans after it, which it has to wait for.
 

@@ -51,17 +51,17 @@ class Derainer(Method):
         model: ONNX file written by ``derain export``; None, or ``default``, takes the model that
             comes with derain, which ``derain info default`` describes.
         threads: Threads for view and network; 0 takes every core this process may use.
-        runtime: What runs the network: ``onnxruntime``, or ``openvino``, which has to be installed
+        runtime: Runtime of the network: ``onnxruntime``, or ``openvino``, which has to be installed
             (``pip install 'derain[openvino]'``).
-        precision: What it computes in: ``float32``, or ``bf16`` with OpenVINO on a processor that
-            has it. Some scores near the threshold then come out on its other side.
+        precision: Precision of computation: ``float32``, or ``bf16`` with OpenVINO on a processor
+            that has it. Some scores near the threshold then come out on its other side.
 
     Attributes:
         path: Its file.
-        name: What commands call it: the file, or ``default``.
-        threads: How many it uses.
-        runtime: What runs the network, and its precision.
-        spec: How the model sees a scan and what it was trained on.
+        name: Its name in commands: the file, or ``default``.
+        threads: Number of threads that it uses.
+        runtime: Runtime of the network, and its precision.
+        spec: The model's view, channels and training data.
         metadata: Everything else in the file's metadata: proof, versions, licence.
 
     Raises:
@@ -200,7 +200,7 @@ class Derainer(Method):
             (820, 0)
 
         A model whose view needs scans after the one that it judges answers for an earlier frame,
-        as many frames back. One of another sequence, or after a gap, starts anew: call
+        as many frames back. One of another sequence, or after a gap, starts a new recording: call
         :meth:`flush` before it, or the frames that still wait are let go of.
 
         Args:

@@ -132,7 +132,7 @@ def tune_filter(
             labelled alike.
         trials: Trials in all, those that the storage holds already included.
         seed: Random seed of the sampler, which draws the parameters of each trial.
-        storage: Where the trials are kept, so that a later search goes on from them, and one at the
+        storage: Storage of the trials, so that a later search goes on from them, and one at the
             same time shares them; None keeps nothing.
         after_trial: Called after each trial.
 

@@ -45,7 +45,7 @@ class DerainingModule(MeasuredModule):
         LOGIT_GAIN: How many times more than other networks' its logits amplify rounding.
         RECIPE: Names of the arguments of its training and of what is called rain. One that
             starts from another model keeps its own, and has the other's in place of all the rest.
-        INTEGER_OPERATORS: What computes in eight bits in a model that is exported so; ONNX names.
+        INTEGER_OPERATORS: Operators in eight bits of a model that is exported so; ONNX names.
         channels: Names of its input channels, as :meth:`Scan.channel` takes them.
         network: The network itself.
         card: Data card of the data it is trained or tested on, once that is agreed with them.
@@ -144,7 +144,7 @@ class DerainingModule(MeasuredModule):
         """Takes over the constants of the network's own rule from its Spec.
 
         Args:
-            rule: What stands under ``rule`` in the Spec. It is not trusted.
+            rule: The entry ``rule`` of the Spec. It is not trusted.
 
         Raises:
             InputError: Constants that the network does not know, or some of its own missing.

@@ -50,7 +50,7 @@ def farther_by(distance: Tensor, dot: Tensor, apart: Tensor) -> Tensor:
     Args:
         distance: Ranges of the points, metres, float; of a shape that goes with the others'.
         dot: Products of the points with the offsets of their neighbours, float.
-        apart: How far those are from the points, metres, float.
+        apart: Their distances from the points, metres, float.
 
     Returns:
         Metres, float, in the shape of ``dot``.

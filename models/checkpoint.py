@@ -56,7 +56,7 @@ def check_resumable(path: Path) -> None:
     """Finds out whether a training can go on from a checkpoint.
 
     Raises:
-        InputError: What `load_model` raises, or a checkpoint without the state of a training.
+        InputError: The errors of `load_model`, or a checkpoint without the state of a training.
     """
     content = read_checkpoint(path)
     _model_of(content, path)
@@ -72,7 +72,7 @@ def network_of_checkpoint(path: Path) -> tuple[type[DerainingModule], dict[str, 
     """The class of a checkpoint's network, by its name in the registry, and its arguments.
 
     Raises:
-        InputError: What `load_model` raises.
+        InputError: The errors of `load_model`.
     """
     content = read_checkpoint(path)
     model = _model_of(content, path)

@@ -39,7 +39,7 @@ class MeasuredModule(lightning.LightningModule, ABC):
     """Measures a network: every scan once, on any number of processes, counts in whole numbers.
 
     Attributes:
-        LEARNS_FROM_LABELS: Whether it does; where not, none is read in its training.
+        LEARNS_FROM_LABELS: True if it does; where not, none is read in its training.
         card: Data card of what is measured, once that is agreed with the data.
         metrics: Counts of the points of the epoch, made when the data are known.
         threshold_counts: Their probabilities, counted between thresholds.
@@ -67,7 +67,7 @@ class MeasuredModule(lightning.LightningModule, ABC):
         """Reads some of the validation scans, spread over all of them, as they are in their files.
 
         Args:
-            most: How many, where there are so many; none where their loader is not derain's.
+            most: The largest number; none where their loader is not derain's.
 
         Raises:
             InputError: A scan that cannot be read.
@@ -80,7 +80,7 @@ class MeasuredModule(lightning.LightningModule, ABC):
         """Logits of "not rain" and "rain" of every cell, float (M, 2), of a view's raw inputs.
 
         Args:
-            inputs: What the view gives, by the names that it has for them.
+            inputs: Inputs from the view, by name.
         """
 
     def logits_of(self, batch: Batch) -> Tensor:
@@ -209,7 +209,7 @@ def log_hyperparameters(loggers: Iterable[object], parameters: Mapping[str, Any]
 
     Args:
         loggers: The run's; those of TensorBoard are written to.
-        parameters: What is to stand in the table. The Spec, which is as long as a page, and names
+        parameters: Entries of the table. The Spec, which is as long as a page, and names
             that begin with an underscore are left out.
     """
     shown = {

@@ -26,7 +26,7 @@ def range_view(
     Args:
         grid: ``fitted`` for one that fits the scans; or the name of a published grid, or its
             bounds, as :func:`~derain.views.spherical_grid.grid_of` takes them.
-        channels: What a pixel holds, in order.
+        channels: Channels of a pixel, in order.
         back_projection: Name of the back-projection, as :class:`RangeView` takes it.
         scans: Training scans.
 

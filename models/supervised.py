@@ -116,7 +116,7 @@ def one_cycle(model: SupervisedModule, final_share: float = 0.0) -> OptimizerLRS
 
     Args:
         model: The model.
-        final_share: How much of the highest learning rate is left at the end.
+        final_share: Share of the highest learning rate at the end.
 
     Source: L. N. Smith and N. Topin, "Super-Convergence: Very Fast Training of Neural Networks
         Using Large Learning Rates", 2018.

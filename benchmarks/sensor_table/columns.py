@@ -17,7 +17,7 @@ class Cell:
 
     Attributes:
         value: An IoU, a share, milliseconds or kilobytes.
-        learnt: Whether the method was trained on some of the column's scans.
+        learnt: True if the method was trained on some of the column's scans.
         counts: Points behind the value, by what they are and were called.
     """
 

@@ -58,7 +58,7 @@ class TaughtScan:
         scan: Its file.
         sequence: Name of its sequence.
         number: Its number in the sequence, from 0.
-        part: Whether it is for training or held out.
+        part: True if it is for training or held out.
     """
 
     key: str
@@ -77,7 +77,7 @@ class Manifest:
         scans: The scans, in time order, one sequence after the other.
         columns: Names of the columns of files that do not name them.
         intensity_scale: Factor from the scans' intensities to the unit that the teacher read.
-        finished: Whether all labels are there.
+        finished: True if all labels are there.
     """
 
     teacher: Mapping[str, Any]

@@ -102,7 +102,7 @@ class Labelling(UnitJudging[LabelledScan]):
     """Labels the scans of one unit after the other, also those without any known point.
 
     Attributes:
-        folder: Where the labels go, as of :func:`derain.annotation.manifest.label_path`.
+        folder: Folder for the labels, as of :func:`derain.annotation.manifest.label_path`.
         card: Data card of the scans, whose own labels measure the method's; None where there is
             none.
     """
@@ -186,7 +186,7 @@ def teach(
         card: Data card of the scans, from which the new one takes licence and unit.
         guard: Surrounds the error of each scan; a scan whose error it suppresses gets no labels.
         watch: Called for each scan as soon as it is judged, in order.
-        division: How the scans are divided into units. Where there are more scans than a block has,
+        division: Division of the scans into units. Where there are more scans than a block has,
             a record of each unit is kept in the folder, by which a teaching that was stopped goes
             on. None keeps no records.
         executor: Does the units: an executor of :mod:`concurrent.futures` or the like, whose

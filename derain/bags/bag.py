@@ -26,9 +26,9 @@ class Message(NamedTuple):
 
     Attributes:
         connection: The reader's connection, which describes its topic and publisher.
-        time: When it was recorded, nanoseconds.
+        time: Time of recording, nanoseconds.
         data: Its bytes.
-        published: When it was published, nanoseconds; 0 in storages other than MCAP.
+        published: Time of publication, nanoseconds; 0 in storages other than MCAP.
         sequence: Its number, as the publisher counts; 0 in storages other than MCAP.
     """
 

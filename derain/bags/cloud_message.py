@@ -39,7 +39,7 @@ class CloudMessage:
         head: Its bytes up to the cloud: the header with stamp and frame.
         cloud: The cloud.
         tail: Its bytes after the cloud.
-        stamp: When the cloud was taken, nanoseconds; 0 where the driver writes none.
+        stamp: Time of the cloud, nanoseconds; 0 where the driver writes none.
     """
 
     encoding: str

@@ -26,8 +26,8 @@ class McapConnection:
     Attributes:
         topic: Name of the topic.
         msgtype: Type of its messages, such as ``sensor_msgs/msg/PointCloud2``.
-        msgcount: How many messages there are, over all files.
-        encoding: How they are written, such as ``cdr``.
+        msgcount: Number of messages, over all files.
+        encoding: Name of the encoding, such as ``cdr``.
         notes: Names and values of the channel's metadata, such as quality of service.
         schema: Name, encoding and content of the definition of the type; None without one.
     """
@@ -73,7 +73,7 @@ class McapFile:
         counts: Number of messages of each channel.
         start: The earliest time of a message, nanoseconds.
         end: The latest.
-        chunks: Where chunks are.
+        chunks: Places of the chunks.
 
     Raises:
         ValueError: A damaged file.

@@ -67,7 +67,7 @@ class McapRecords:
         file: The file, open.
 
     Attributes:
-        profile: What the header calls the kind of recording, such as ``ros2``.
+        profile: The header's name for the kind of recording, such as ``ros2``.
         data: Bytes from the first to the last of the data.
         summary: Bytes of the summary, which follows them; empty where there is none.
 

@@ -21,7 +21,7 @@ class RosbagsWriter:
     Args:
         bag: The other bag.
         reader: The library's reader of it, open.
-        path: Where the bag is written: a file of ROS 1, a folder of ROS 2.
+        path: Path of the written bag: a file of ROS 1, a folder of ROS 2.
     """
 
     def __init__(self, bag: Bag, reader: Any, path: Path) -> None:
@@ -50,7 +50,7 @@ class RosbagsWriter:
         """Writes a message.
 
         Args:
-            connection: What :meth:`connection` gave.
+            connection: A result of :meth:`connection`.
             like: The message of the other bag whose time it gets.
             data: Its bytes.
         """

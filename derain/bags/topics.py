@@ -40,8 +40,8 @@ class Topic:
     Attributes:
         name: Its name.
         type: Type of its messages.
-        messages: How many there are, by the bag's index.
-        encoding: How they are written: ``ros1`` or ``cdr``.
+        messages: Their number, by the bag's index.
+        encoding: Name of the encoding: ``ros1`` or ``cdr``.
     """
 
     name: str

@@ -47,12 +47,12 @@ class DataCard:
         range: Mean and standard deviation of range in metres; None if not known.
         extra: Mean and standard deviation of further channels, by name, such as ``doppler``.
         rain_share: Share of rain among the training points; None if not known.
-        simulated: Whether its rain or snow fell in a computer; scores on it are labelled so.
-        deduplicate: Whether results on it count points at one position once, as those of a sensor
+        simulated: True if its rain or snow is simulated; scores on it are labelled so.
+        deduplicate: True if results on it count points at one position once, as those of a sensor
             that writes many points twice are published.
         split: Sequences of ``train``, ``validation`` and ``test``; empty without an official split.
-        layout: Where its scans and labels lie.
-        auto_detect: What may be concluded where folders have the names of ``layout`` and nobody
+        layout: Layout of its scans and labels.
+        auto_detect: Conclusion if folders have the names of ``layout`` and nobody
             names a card: ``nothing``; ``classes``, the names of the classes; or ``rain``, all that
             the card says.
         parts: Ids of the classes of each of several data sets that it is the card of, by name; no

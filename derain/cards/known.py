@@ -31,8 +31,8 @@ def card_by_folders(layout: Layout, least: AutoDetect) -> DataCard | None:
     """The packaged data card that follows from folders of a layout.
 
     Args:
-        layout: What the folders are called.
-        least: What has to follow: ``classes`` or ``rain``.
+        layout: Names of the folders.
+        least: Required conclusion: ``classes`` or ``rain``.
 
     Returns:
         The card from whose folders so much follows; None without one.

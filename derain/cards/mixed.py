@@ -31,7 +31,7 @@ class LabelMap:
 
         Args:
             label: The data set's own ids, int64 (N,).
-            name: What messages call the labels.
+            name: Name of the labels in messages.
 
         Raises:
             InputError: Ids that are no classes of the data set.

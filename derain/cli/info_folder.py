@@ -35,10 +35,10 @@ class FolderFacts:
 
     Attributes:
         folder: The folder.
-        layout: What its folders are called; None where scans lie directly in it.
+        layout: Names of its folders; None where scans lie directly in it.
         card: The data card that names the classes; None where none does.
-        card_rests_on: What the card was chosen by.
-        by_rain_rate: What was counted, by rain rate in mm/h in ascending order; None last, for
+        card_rests_on: Evidence for the card.
+        by_rain_rate: Counts by rain rate in mm/h in ascending order; None last, for
             where it is not known.
     """
 
@@ -130,8 +130,8 @@ def facts_of_folder(
         layout_names: Names of its folders of scans and labels, with a comma between; None finds
             them.
         columns: Names of the columns of files that do not name them.
-        records: Where records of what is counted are kept; None keeps none.
-        division: How the scans are divided into units.
+        records: Folder for records of the counts; None keeps none.
+        division: Division of the scans into units.
         executor: Counts the units; None counts them in this process.
 
     Returns:

@@ -38,7 +38,7 @@ def list_methods(parser: Parser, of_recordings: bool = True) -> None:
 
     Args:
         parser: The command's parser.
-        of_recordings: Whether methods that see several scans are listed too.
+        of_recordings: True if methods that see several scans are listed too.
     """
     # Listed when help is asked for: most starts need not look for what other packages bring.
     parser.late_epilog = partial(_listed_methods, of_recordings)
@@ -66,7 +66,7 @@ def add_runtime(parser: argparse.ArgumentParser, help: str) -> None:
 
     Args:
         parser: The command's parser.
-        help: What the command does with it.
+        help: Use of it by the command.
     """
     parser.add_argument(
         "--runtime",
@@ -132,7 +132,7 @@ def add_method_and_scans(parser: Parser, help: str) -> None:
 
     Args:
         parser: The command's parser.
-        help: What the scans are.
+        help: Description of the scans.
     """
     parser.add_argument(
         "method", metavar="[METHOD]", help="ONNX file, YAML file of parameters, or name of a method"

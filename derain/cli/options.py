@@ -92,9 +92,9 @@ def add_columns(
 
     Args:
         parser: The command's parser, or a group of its arguments.
-        option: What the option is called.
+        option: Name of the option.
         of: Whose files they are, where a command reads several kinds.
-        default: What it is where it is not given; None leaves that to the command.
+        default: Its default; None leaves that to the command.
     """
     parser.add_argument(
         option,
@@ -187,7 +187,7 @@ def labelled(
         columns: Names of the columns of files that do not name them.
         intensity_scale: Factor from the scans' intensities to the unit of the data card.
         topic: Topic of point clouds in bags; None where the paths name it.
-        distinct: Whether points at one position count once; None follows the data card.
+        distinct: True if points at one position count once; None follows the data card.
 
     Raises:
         InputError: Data whose labels nothing explains, or a root without sequences.

@@ -61,7 +61,7 @@ def add_executor(group: "argparse._ArgumentGroup", workers: str) -> None:
     """Declares the options of :func:`executor_of`.
 
     Args:
-        group: Where they are declared.
+        group: Group to declare the options in.
         workers: Help of ``--workers``.
     """
     group.add_argument("--workers", type=count, metavar="N", help=workers)

@@ -63,18 +63,18 @@ class ModelCard:
     FAT* 2019.
 
     Attributes:
-        name: What the model is called.
+        name: Name of the model.
         version: Which of the models that were handed out under this name it is.
-        what: What it is and what it sees, in a sentence.
+        what: A description of the model and its inputs, in a sentence.
         training: Commands that make it again, in their order.
         seed: Seed of everything that was drawn at random for it.
-        data: What it learnt from.
+        data: Its training data.
         licence: Licence of the model, which those of the data allow.
         threshold: A point is rain where its probability is greater; as in its Spec.
-        threshold_chosen: How the threshold was chosen.
-        scores: How it does on data that it has not seen.
+        threshold_chosen: The choice of the threshold.
+        scores: Scores on data that it was not trained on.
         measured: Command that measures it.
-        not_for: When not to use it.
+        not_for: Cases in which not to use it.
         sha256: SHA-256 of its file, in hexadecimal digits.
     """
 

@@ -64,7 +64,7 @@ class Answers:
         Args:
             scan: A scan with the teacher's labels.
             card: Data card of these labels.
-            called_rain: What the student calls rain, bool (N,); None without a student.
+            called_rain: The student's rain, bool (N,); None without a student.
 
         Raises:
             InputError: A scan without labels.
@@ -136,7 +136,7 @@ class AnswersOfScan:
 
     Attributes:
         key: Key of the scan.
-        held_out: Whether the student did not learn from it, but is chosen and measured by it.
+        held_out: True if the student did not learn from it, but is chosen and measured by it.
         answers: The answers.
     """
 
@@ -164,7 +164,7 @@ class TruthRecord:
 
     Args:
         card: Data card of the scans.
-        titles: What each answer is called.
+        titles: Name of each answer.
 
     Attributes:
         scans: Number of scans that were measured.

@@ -41,7 +41,7 @@ def example_scan(weather: Literal["rain", "snow"] = "snow") -> Scan:
         >>> clean = scan.xyz[~derain.Derainer()(scan)]
 
     Args:
-        weather: What falls.
+        weather: The precipitation.
 
     Returns:
         x, y, z in metres as seen from the sensor, intensities from 0 to 255, and labels.

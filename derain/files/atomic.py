@@ -55,7 +55,7 @@ def writing(path: Path) -> Iterator[None]:
     """Turns the errors of writing `path` into an InputError.
 
     Args:
-        path: What the block writes.
+        path: File that the block writes.
 
     Raises:
         InputError: It cannot be written.
@@ -178,8 +178,8 @@ def lock(descriptor: int, *, wait: bool, shared: bool = False) -> bool:
 
     Args:
         descriptor: The file or the folder.
-        wait: Whether to wait for another process that holds it.
-        shared: Whether others may hold it at the same time that share it, too.
+        wait: True to wait for another process that holds it.
+        shared: True if others may hold it at the same time that share it, too.
 
     Returns:
         False where another holds it and is not waited for.

@@ -55,7 +55,7 @@ class Content:
     Attributes:
         path: The file.
         data: Its bytes, decompressed where the file is compressed as a whole.
-        budget: What they may expand to.
+        budget: Bound on their expanded size.
     """
 
     path: Path

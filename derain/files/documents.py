@@ -88,7 +88,7 @@ class Entry:
     Attributes:
         source: The file, or whatever else holds the document.
         key: Keys that lead to the value, joined by dots; empty for the whole document.
-        value: What stands there.
+        value: The value.
     """
 
     source: Path | str
@@ -123,7 +123,7 @@ class Entry:
 
         Args:
             text: The document.
-            source: What it stands in, for messages.
+            source: The surrounding file, for messages.
             largest: Characters that it may have.
 
         Raises:
@@ -184,7 +184,7 @@ class Entry:
         """Parses a mapping with known keys.
 
         Args:
-            parsers: What reads the value, by key.
+            parsers: Parser of the value, by key.
             required: Keys that may not be missing.
         """
         members = self.members()
@@ -213,7 +213,7 @@ class Entry:
 
         Args:
             count: How many; None allows any number.
-            read: What reads each of them, such as ``Entry.positive``; by default ``Entry.number``.
+            read: Parser of each of them, such as ``Entry.positive``; by default ``Entry.number``.
         """
         items = self.items()
         if count is not None and len(items) != count:
@@ -317,7 +317,7 @@ def parsed_yaml(text: str, largest: int = LARGEST_DOCUMENT, aliases: bool = Fals
     Args:
         text: The text.
         largest: Characters that it may have.
-        aliases: Whether it may use aliases, as programs write them; whoever goes through all of it
+        aliases: True if it may use aliases, as programs write them; whoever goes through all of it
             may then find far more than was written.
 
     Raises:
@@ -361,7 +361,7 @@ def packaged_or_own(name: str | Path, files: Mapping[str, Path], kind: str) -> P
     Args:
         name: Name of a packaged file, or the path of one of the user's own.
         files: The packaged ones, by name.
-        kind: What they are, such as "sensor", for the message.
+        kind: Kind of document, such as "sensor", for the message.
 
     Raises:
         InputError: There is no such file.

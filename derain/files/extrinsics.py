@@ -45,7 +45,7 @@ class Extrinsics:
         """Takes points of a sensor into the frame in which the sensor has a pose.
 
         Args:
-            x: Where the sensor is: ahead, metres.
+            x: Position of the sensor: ahead, metres.
             y: To the left, metres.
             z: Above, metres.
             roll: Turn about its x axis, degrees, applied first.

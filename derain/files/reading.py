@@ -15,7 +15,7 @@ def reading(path: Path, *damage: type[Exception]) -> Iterator[None]:
 
     Args:
         path: The file that the block reads.
-        damage: What the format's library raises on content that it cannot read.
+        damage: Exceptions of the format's library on damaged content.
 
     Raises:
         InputError: The file is missing, cannot be opened, is damaged, or needs more memory than

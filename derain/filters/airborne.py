@@ -43,7 +43,7 @@ class RainBounds:
 
     Attributes:
         intensity: Bound of its intensity, in the scan's own unit.
-        is_bright: Whether rain is above that bound; else it is at most so bright.
+        is_bright: True if rain is above that bound; else it is at or below it.
         range: Distance that it is within, metres.
     """
 
@@ -133,7 +133,7 @@ def _greatest_difference(
 
     Args:
         intensity: Intensities, float32 (Q,).
-        airborne: Which of the points are in the air, bool (Q,); some are, and some are not.
+        airborne: True for points in the air, bool (Q,); some are, and some are not.
 
     Returns:
         The bound, whether what is in the air is brighter than it, and by how much the shares beyond

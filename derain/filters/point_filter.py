@@ -63,7 +63,7 @@ class PointFilter(ABC):
                 return np.linalg.norm(view.points[:, :3], axis=1) < self.reach
 
     Attributes:
-        HELP: What rain is to the filter, in one line for the help of commands.
+        HELP: The filter's definition of rain, in one line for the help of commands.
         SPACE: Where each parameter is looked for by ``derain tune``; those not named stay as they
             are by default. Whole numbers are drawn evenly, all else evenly in its logarithm: what
             fits one sensor may be a tenth of what fits another. A filter without any is not tuned.
@@ -180,7 +180,7 @@ def rain_among(
 
     Args:
         filter: The filter.
-        view: What it sees of the scan, M points.
+        view: View of the scan, M points.
         scan: The scan.
         candidates: Bounds outside which nothing is rain; None where anything may be.
 

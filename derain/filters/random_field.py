@@ -74,13 +74,13 @@ def _turn_in_waves(
     """Turns what is taken for rain and is none, until nothing turns any more.
 
     Args:
-        is_rain: What the U uncertain points are taken for, bool (U,); decided in place.
+        is_rain: Current state of the U uncertain points, bool (U,); decided in place.
         open_: Numbers of the H points whose verdicts are open, int64 (H,).
         own: Their features, float64 (H,).
         votes: The votes for them while all before them are rain, float64 (k - 1, H); changed in
             place.
         at_least: The votes for them where none before them is, float64 (k - 1, H).
-        dependents: Which of them hear of whose decision.
+        dependents: Points that depend on each decision.
     """
     turned = np.flatnonzero(~is_rain)
     while len(turned):

@@ -33,7 +33,7 @@ class Job:
         folder: The folder of the results, a path or a URL.
         options: Texts, numbers, true or false by name, among them the command and derain's version:
             all of what the results depend on but the inputs.
-        shards: How many shards it was begun in, and what a batch system calls the first of them;
+        shards: Number of shards that it was started in, and a batch system's number of the first;
             None where it was begun as a whole.
     """
 
@@ -57,7 +57,7 @@ class Job:
             options: The options.
             units: All of its units, which are listed for :meth:`listed`.
             shard: The shard that is done now; None for all of it.
-            anew: Whether the records of another job are removed; its results stay until they are
+            anew: True if the records of another job are removed; its results stay until they are
                 written anew.
 
         Raises:

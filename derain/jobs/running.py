@@ -136,7 +136,7 @@ class Task(Generic[UnitT, ResultT]):
 
     Attributes:
         job: The job; None keeps no records.
-        work: What is done.
+        work: The work for each unit.
         folder: The folder that relative paths begin in; None where there are none.
         version: The version of derain that began it.
     """
@@ -222,7 +222,7 @@ class UnitResult(Generic[UnitT, ResultT]):
     Attributes:
         unit: The unit that it is of.
         result: The result.
-        before: Whether an earlier command had it.
+        before: True if an earlier command had it.
     """
 
     unit: UnitT
@@ -238,9 +238,9 @@ def run(
     """Does the units of a job that are not done.
 
     Args:
-        task: What is done of each.
+        task: Work for each unit.
         units: The units.
-        executor: What does them; None does one after the other in this process.
+        executor: Executor of the units; None does one after the other in this process.
 
     Yields:
         Each result, in the order of the units, as soon as it and all before it are known.
@@ -260,7 +260,7 @@ def completed(task: Task[UnitT, ResultT], units: Sequence[UnitT]) -> list[Result
     """The results of all units of a job, whoever did them; None while one is to be done.
 
     Args:
-        task: What is done of each.
+        task: Work for each unit.
         units: All units of the job.
     """
     results: list[ResultT] = []
@@ -284,12 +284,12 @@ def values(
     Where records are kept, a unit that fails does not stop the others.
 
     Args:
-        task: What is done of each.
+        task: Work for each unit.
         units: All units of the job.
         shard: Those that are done now.
-        executor: What does them; None does one after the other in this process.
-        doing: What a progress bar calls it, such as "counting".
-        unit: What a unit is.
+        executor: Executor of the units; None does one after the other in this process.
+        doing: Its title in a progress bar, such as "counting".
+        unit: Name of a unit in messages.
 
     Returns:
         The results, in the order of the units; None while other shards are to be done.

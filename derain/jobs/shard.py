@@ -23,10 +23,10 @@ class Shard:
     """One of the shards of a job.
 
     Attributes:
-        number: Which, from 0.
-        count: How many there are.
-        first: What a batch system calls the first of them.
-        of_array: Whether it is a task of a batch system's array.
+        number: Number of the shard, from 0.
+        count: Their number.
+        first: A batch system's number of the first shard.
+        of_array: True if it is a task of a batch system's array.
 
     Raises:
         InputError: No such shard.

@@ -31,10 +31,10 @@ class Record:
         inputs: Fingerprint of what it read.
         options: Fingerprint of the options of its job.
         worker: Host and number of the process.
-        ended: When it ended, in ISO 8601, by the clock of its worker.
-        seconds: How long it took.
-        errors: What went wrong, as subject, reason and remedy each; empty where nothing did.
-        results: What came of it, as the job writes it.
+        ended: Its end, in ISO 8601, by the clock of its worker.
+        seconds: Duration, seconds.
+        errors: Errors, with subject, reason and remedy each; empty without errors.
+        results: Results, in the form of the job.
     """
 
     unit: str

@@ -28,7 +28,7 @@ def generator_of(draw: Draw, seed: int, epoch: int, *number: int) -> np.random.G
     """The random generator of one draw.
 
     Args:
-        draw: What is drawn.
+        draw: Kind of draw.
         seed: Seed of the run.
         epoch: The epoch, from 0.
         number: The number of the scan in the data, and which time it is drawn where that is not the

@@ -28,8 +28,8 @@ class Task:
 
     Attributes:
         card: Data card of the scans, with the statistics that training needs.
-        spec: How the network is used: its view, channels and normalisation.
-        reads_labels: Whether training learns from labels; where not, none is read for it.
+        spec: Use of the network: its view, channels and normalisation.
+        reads_labels: True if training learns from labels; where not, none is read for it.
     """
 
     card: DataCard
@@ -84,7 +84,7 @@ def agree_on_task(model: "DerainingModule", data: TrainingData, training: bool =
     Args:
         model: The model. One that has a Spec, of an earlier training or of a checkpoint, keeps it.
         data: Its data module.
-        training: Whether the model is to be trained: then what the data card lacks is measured,
+        training: True if the model is to be trained: then what the data card lacks is measured,
             and a model without a Spec gets one, its view fitted to training scans.
 
     Raises:

@@ -239,7 +239,7 @@ def caption(frame: Frame, scan: Scan, labels: Labels | None, held_out: bool) -> 
         frame: The frame.
         scan: Its scan.
         labels: The labels that its rain is known by; None where it has none.
-        held_out: Whether a model was trained, and not on this scan.
+        held_out: True if a model was trained, and not on this scan.
     """
     which = f"**{_escaped(frame.key)}**, {len(scan):,} points" + ", held out" * held_out
     coloured = palette.OUTCOMES if labels else palette.WITHOUT_LABELS

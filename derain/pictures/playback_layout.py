@@ -27,7 +27,7 @@ def layout(methods: Mapping[str, Method], labels: Labels | None, placed: bool) -
     Args:
         methods: The methods by their titles.
         labels: Labels of the scans, where they have some.
-        placed: Whether the sensor's poses are known.
+        placed: True if the sensor's poses are known.
     """
     return Blueprint(
         views.Vertical(

@@ -63,7 +63,7 @@ class Registration:
         residual: Median distance of this scan's surfaces from those of the scan before, metres; NaN
             where no point found a partner.
         matched: Share of its points that found a partner in the scan before; 0..1.
-        trusted: Whether the motion is what it seems to be.
+        trusted: True if the motion is plausible.
         reason: Why not; empty where it is trusted.
     """
 
@@ -123,7 +123,7 @@ class Trust:
         """Why two scans do not lie upon one another; empty where they do.
 
         Args:
-            fit: How they lie.
+            fit: The fit.
         """
         if fit.matched < LEAST_MATCHED:
             return (
@@ -163,8 +163,8 @@ class Trust:
         """Takes a registration that fits into what is usual.
 
         Args:
-            fit: How the two scans lie upon one another.
-            trusted: Whether a vehicle may have moved so.
+            fit: The fit of the two scans.
+            trusted: True if a vehicle can move in this way.
         """
         if trusted:
             self._residuals.append(fit.residual)

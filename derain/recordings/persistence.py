@@ -75,7 +75,7 @@ class PersistenceDerainer(RecordingMethod):
         [True, False, False, False]
 
     Args:
-        persistence: How far it looks, and when it is sure.
+        persistence: Its window, and the odds at which it is sure.
         threads: Threads to use; 0 takes every core this process may use.
 
     Source: free and occupied space as evidence follows occupancy grids (A. Elfes, "Using Occupancy

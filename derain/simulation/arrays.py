@@ -36,7 +36,7 @@ class Returns(Columns):
     the strongest first.
 
     Attributes:
-        range: Where the beam ends, as a distance from the sensor, float64 (N,), metres; the maximum
+        range: End of the beam, as a distance from the sensor, float64 (N,), metres; the maximum
             range where nothing returned.
         reflectivity: Apparent reflectivity, float64 (N,), in 0..1: what a surface across the whole
             beam and facing the sensor would need to return as much through clear air. 0 where

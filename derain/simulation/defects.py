@@ -59,9 +59,9 @@ class Defects(Settings):
         """Lets beams at the border of two surfaces return both, or what lies in between.
 
         Args:
-            returns: What the sensor detects.
+            returns: Detected returns.
             columns: Beams per row of the sensor.
-            dual: Whether it reports two returns of a beam.
+            dual: True if it reports two returns of a beam.
             generator: Random generator.
 
         Returns:
@@ -83,7 +83,7 @@ class Defects(Settings):
         """True for returns that are not lost, bool (N,).
 
         Args:
-            returns: What the sensor detects.
+            returns: Detected returns.
             shape: Rows of the sensor and beams per row.
             generator: Random generator.
         """

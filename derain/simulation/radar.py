@@ -62,12 +62,12 @@ class Radar:
         columns: Cells across the field of view.
         rows: Cells from its lower to its upper edge.
         range_cell: Depth of a cell, metres.
-        minimum_range: Where the first cell begins, metres.
-        maximum_range: What is farther is not seen, metres.
+        minimum_range: Begin of the first cell, metres.
+        maximum_range: Farther surfaces are not seen, metres.
         reach: Where the receiver's noise is as strong as the echo of 1 m², metres; it grows with
             the fourth power of distance, as echoes get weaker.
         leakage: What the transmitter leaks into every cell, as a radar cross-section, dBsm.
-        false_alarm_rate: How probably a cell of nothing but noise is a detection.
+        false_alarm_rate: Probability that a cell of noise alone is a detection.
         accuracy: Standard deviation of a measured position, as a share of the cell.
         doppler_noise: Standard deviation of a measured speed, m/s.
         mounting_height: Height above the road, metres.
@@ -152,7 +152,7 @@ def detect(mean: Floats, radar: Radar, generator: Generator) -> Scan:
     """Makes one frame.
 
     Args:
-        mean: What :func:`mean_echoes` gave.
+        mean: A result of :func:`mean_echoes`.
         radar: The radar.
         generator: Random generator.
 

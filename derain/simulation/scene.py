@@ -77,12 +77,12 @@ class SimulatedScene:
     """A place, the rain on it and the weather; and what moves in it.
 
     Attributes:
-        track: What stands.
+        track: The track at rest.
         rain: The rain; it is the same wherever the sensor is.
         weather: The record of it, see :func:`weather_record`.
-        course: How the sensor moves; None stands at the origin of the track.
-        traffic: What else moves.
-        skew: Whether they move on while a scan is taken, see :class:`Drive`.
+        course: Motion of the sensor; None for a sensor at rest at the origin of the track.
+        traffic: Other moving objects.
+        skew: True if they move on while a scan is taken, see :class:`Drive`.
     """
 
     track: Track
@@ -118,7 +118,7 @@ class SimulatedScene:
 
         Args:
             sensor: The sensor.
-            times: When the scans begin, float64 (T,), seconds.
+            times: Start times of the scans, float64 (T,), seconds.
 
         Yields:
             As :meth:`Track.cast`; labels have the number of what moves in their upper 16 bits.

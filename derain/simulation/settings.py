@@ -49,8 +49,8 @@ class Settings:
     """The base of frozen settings, of which a document states those that differ.
 
     Attributes:
-        SUBJECT: What messages call the settings.
-        READ_BY: What reads the attributes that are not read by their types, by name.
+        SUBJECT: Name of the settings in messages.
+        READ_BY: Parsers of attributes that are not parsed by type, by name.
 
     Raises:
         InputError: A value that is impossible. It names the first such attribute.

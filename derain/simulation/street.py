@@ -41,7 +41,7 @@ class Street:
     """The ground plan of a street.
 
     Attributes:
-        length: How far the sensor drives, metres.
+        length: Distance that the sensor drives, metres.
         lane: Width of each of the two lanes, metres.
         junctions: Where the axes of side streets are, metres along x, ascending. They are as wide
             as the street's two lanes and carry traffic across it.

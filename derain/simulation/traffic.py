@@ -103,7 +103,7 @@ class MovingThing:
     """Something that moves at a steady speed.
 
     Attributes:
-        surface: Where it is at the first scan.
+        surface: Its place at the first scan.
         velocity: Along x and y, float64 (2,), m/s.
     """
 
@@ -127,10 +127,10 @@ def draw_traffic(
     moment of the drive, and none comes too near another or the sensor's vehicle at any scan.
 
     Args:
-        count: How many.
+        count: Their number.
         street: Where.
         speed: Of the sensor, m/s.
-        times: When the scans are taken, float64 (T,), seconds from 0 on.
+        times: Times of the scans, float64 (T,), seconds from 0 on.
         generator: Random generator.
 
     Raises:

@@ -27,7 +27,7 @@ class BagFrame(FileFrame):
 
     Attributes:
         clouds: The clouds of its topic.
-        cloud_number: Which of them it is, from 0, also where its place in its sequence is another.
+        cloud_number: Its number, from 0, also where its place in its sequence is another.
     """
 
     clouds: CloudTopic
@@ -93,8 +93,8 @@ def bag_frames(path: Path, labelled: bool = False, by_name: bool = False) -> lis
     Args:
         path: A bag; a topic in it, ``bag/topic``; or one of its clouds, ``bag/topic/000012`` or
             ``bag/000012``.
-        labelled: Whether frames have their labels: ``<stem of the bag>.labels/000012.label``.
-        by_name: Whether keys begin with the stem of the bag, as where several are named.
+        labelled: True if frames have their labels: ``<stem of the bag>.labels/000012.label``.
+        by_name: True if keys begin with the stem of the bag, as where several are named.
 
     Raises:
         InputError: A path that leads into no bag; a bag that cannot be read; no such topic or
@@ -118,7 +118,7 @@ def bag_frame(clouds: CloudTopic, number: int, key: str) -> BagFrame:
 
     Args:
         clouds: The clouds.
-        number: Which of them, from 0.
+        number: Number of the cloud, from 0.
         key: Names the outputs of the frame.
     """
     frame = BagFrame(

@@ -40,8 +40,8 @@ class CleanSink:
         folder: Folder to write to, made if missing; or a URL, to which a run in units writes.
         source: The scans.
         removed: Folder for the removed points of files; None leaves them out.
-        probability: Whether the written scans have the column ``rain_probability``.
-        bags: What is written of the clouds of bags.
+        probability: True if the written scans have the column ``rain_probability``.
+        bags: Options for the clouds of bags.
 
     Raises:
         InputError: The folder holds files that must not be overwritten, two scans have one name, or
@@ -50,7 +50,7 @@ class CleanSink:
     Attributes:
         folder: Folder to write to, or the path that stands for its URL.
         destination: By which any process opens a sink alike for other scans.
-        options: What is written, true or false or a name each.
+        options: Options, true, false or a name each.
     """
 
     def __init__(
@@ -159,8 +159,8 @@ class Destination:
     Attributes:
         folder: The folder, a path or a URL.
         removed: Folder for the removed points of files, a path or a URL; None leaves them out.
-        probability: Whether the written scans have the column ``rain_probability``.
-        bags: What is written of the clouds of bags.
+        probability: True if the written scans have the column ``rain_probability``.
+        bags: Options for the clouds of bags.
     """
 
     folder: Place

@@ -36,7 +36,7 @@ class BagOptions:
         cleaned_topic: Name of a further topic, of clean clouds; None replaces the clouds of the
             topic that is read.
         removed_topic: Name of a further topic, of the points that were removed; None for none.
-        keep_shape: Whether organised clouds stay organised.
+        keep_shape: True if organised clouds stay organised.
     """
 
     cleaned_topic: str | None = None
@@ -52,8 +52,8 @@ class CleanedBags:
     Args:
         out: The folder to write to.
         source: All frames of the run. Bags of which it has only some clouds are not copied.
-        options: What is written of each cloud.
-        probability: Whether points get a field of their probability to be rain.
+        options: Options for each cloud.
+        probability: True if points get a field of their probability to be rain.
 
     Raises:
         InputError: A copy would replace or enter a bag that is read, or something that is no bag;

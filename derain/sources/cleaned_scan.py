@@ -71,8 +71,8 @@ class ScanOutcome:
     Attributes:
         frame: The scan.
         issues: Warnings about it.
-        cleaned: What was done to it; None where it could not be cleaned.
-        seconds: When it was taken, seconds; None where that is not known.
+        cleaned: Its results; None if it could not be cleaned.
+        seconds: Its time, seconds; None if unknown.
         packed: The weather that it shows, as text; None where it was not measured.
         error: Why it could not be cleaned; None where it was.
         recording: The unbroken recording that it is of, where only its unit shows that.
@@ -149,7 +149,7 @@ class CleanedTotals:
         """The hours with the shortest visibility, the worst first.
 
         Args:
-            most: At most so many.
+            most: The largest number.
         """
         known = [each for each in self.by_hour.items() if each[1].visibility.known]
         return sorted(known, key=lambda each: each[1].visibility.shown)[:most]

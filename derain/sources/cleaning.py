@@ -107,9 +107,9 @@ def clean(
             them, such as :class:`derain.recordings.posed.Odometry`. None leaves the frames as they
             are.
         most_removed: Scans with a greater share of rain in their valid points are not written.
-        weather: How the weather is measured.
+        weather: Options for measuring the weather.
         observer: Follows the cleaning.
-        division: How the scans are divided into units. Where there are more scans than a block has,
+        division: Division of the scans into units. Where there are more scans than a block has,
             a record of each unit is kept in the folder, by which a run that was stopped goes on.
             None keeps no records, unless there is an executor, or a source or a sink in an object
             store.

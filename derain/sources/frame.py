@@ -19,13 +19,13 @@ class Frame(ABC):
     """A scan that a source can give, in its place in time and space.
 
     Attributes:
-        key: What is made of it is named by this: a relative path without a suffix, such as
+        key: Name of its results: a relative path without a suffix, such as
             ``000012`` or ``03/velodyne/000012``, which no other frame of its source has.
         sequence: Name of the recording that it belongs to; frames of one sequence are of one
             sensor, one after the other.
         number: Its place in its sequence, from 0.
-        label_path: Where its labels are, or should be; None where none are to be read.
-        intensity_scale: What takes its intensities to the unit in which they are to be seen.
+        label_path: Path of its labels, existing or not; None if none are to be read.
+        intensity_scale: Factor from its intensities to the required unit.
         sensor_to_world: Its pose, float64 (4, 4), metres, where it is given; None leaves it to
             what lies beside the scan.
         label_map: Takes its labels to the classes of several data sets that it is one of; None
@@ -176,7 +176,7 @@ class Frame(ABC):
         :meth:`derain.scan.Scan.with_intensity_times`.
 
         Args:
-            factor: What takes them there, such as 255 from 0..1 to 0..255.
+            factor: The factor, such as 255 from 0..1 to 0..255.
         """
         return replace(self, intensity_scale=self.intensity_scale * factor)
 
@@ -187,8 +187,8 @@ class MemoryFrame(Frame):
 
     Attributes:
         scan: The scan.
-        seconds: When it was taken, seconds; None where that is not known.
-        reads_labels: Whether its labels are to be read.
+        seconds: Its time, seconds; None if unknown.
+        reads_labels: True if its labels are to be read.
     """
 
     scan: Scan

@@ -46,7 +46,7 @@ class Failures:
         """Reports and keeps the error of the block.
 
         Args:
-            frame: What the block works on.
+            frame: Frame that the block works on.
         """
         try:
             with reading(Path(frame.name)):  # which names the file where the memory is full

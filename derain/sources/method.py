@@ -41,7 +41,7 @@ class Method(ABC):
 
     Attributes:
         EXAMINE_EVERY: One scan in so many is examined for what :meth:`issues` gives.
-        warns: Whether it warns of that, by :class:`~derain.errors.ScanWarning`. What prints the
+        warns: True if it warns of that, by :class:`~derain.errors.ScanWarning`. What prints the
             issues itself sets it to False.
     """
 
@@ -75,8 +75,8 @@ class Method(ABC):
     ) -> Judgement | None:
         """Takes the next frame of a recording.
 
-        A frame of another sequence, or after a gap, starts anew: call :meth:`flush` before it, or
-        the frames that still wait are dropped.
+        A frame of another sequence, or after a gap, starts a new recording: call :meth:`flush`
+        before it, or the frames that still wait are dropped.
 
         Args:
             frame: A frame, which is read; or a Scan, or (N, ≥ 3) numbers: x, y, z in metres in the

@@ -53,8 +53,8 @@ def finite_numbers(path: Path, place: int, words: Sequence[str], count: int) -> 
     Args:
         path: The file.
         place: Number of the line, for messages.
-        words: What stands in it.
-        count: How many it has to be.
+        words: The text of the line, split.
+        count: Number of values that it must have.
 
     Raises:
         InputError: Something else.

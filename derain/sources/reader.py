@@ -20,8 +20,8 @@ class FrameReader:
 
     Attributes:
         card: Says which labels there are.
-        intensity_scale: What takes the scans' intensities to the unit of the card.
-        columns: Which columns to keep besides those that every scan has: to a model, the others
+        intensity_scale: Factor from the scans' intensities to the unit of the card.
+        columns: Columns to keep besides those of every scan: to a model, the others
             would only cost memory. None keeps all.
     """
 

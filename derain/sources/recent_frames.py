@@ -63,7 +63,7 @@ class RecentFrames:
     """Takes frame after frame, and gives each back once those after it are there.
 
     A frame that does not follow the one before it, in another sequence or with some missing
-    between, starts anew: no window reaches over the gap.
+    between, starts a new recording: no window reaches over the gap.
 
     Args:
         window: Frames before and after one that are to be seen with it.

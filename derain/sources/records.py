@@ -141,10 +141,10 @@ def line_of(record: Path, lines: int, scan: str, place: int | None, scans: int) 
 
     Args:
         record: The record, for messages.
-        lines: How many it has.
+        lines: Number of lines that it has.
         scan: Name of the scan's file.
         place: The scan's place among all of its sequence; None where it is not one of them.
-        scans: How many there are.
+        scans: Their number.
 
     Raises:
         InputError: There is no such line.

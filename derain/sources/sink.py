@@ -24,8 +24,8 @@ class FolderSink:
 
     Args:
         folder: The folder, made if missing.
-        option: What a user calls it, for messages.
-        again: Whether a source may give a scan twice, as where two patterns find it.
+        option: The user's name for it, for messages.
+        again: True if a source may give a scan twice, as where two patterns find it.
         removed: Folder for what is taken away of the scans, named like these; None to drop it.
     """
 
@@ -91,9 +91,9 @@ class FolderSink:
 
         Args:
             frame: The frame.
-            scan: What is left of the scan; None where only labels are of interest.
+            scan: The cleaned scan; None where only labels are of interest.
             label: Class ids or a bool mask of the scan that the labels are for, (N,).
-            removed: What was taken away of the scan; None where it is dropped.
+            removed: The removed points of the scan; None where it is dropped.
 
         Raises:
             InputError: It cannot be written.
@@ -131,7 +131,7 @@ class LabelSink(FolderSink):
 
     Args:
         folder: The folder, made if missing.
-        option: What a user calls it, for messages.
+        option: The user's name for it, for messages.
     """
 
     def refuse_clashes(self, source: Iterable[Frame]) -> None:

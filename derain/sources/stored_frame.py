@@ -27,7 +27,7 @@ class StoredFrame(FileFrame):
     """A frame in an object store; its path only names it.
 
     Attributes:
-        objects: What is to be fetched.
+        objects: The objects to fetch.
     """
 
     objects: tuple[StoredObject, ...]
@@ -37,7 +37,7 @@ class StoredFrame(FileFrame):
         """The frames that it stands for, of which all is on this machine.
 
         Args:
-            where: Where its objects are.
+            where: Place of its objects.
 
         Raises:
             InputError: A bag that cannot be read.
@@ -57,10 +57,10 @@ class StoredScan(StoredFrame):
     """A scan in an object store. Each time it is read, it is fetched.
 
     Attributes:
-        recorded: When it was taken, and its pose, as the records beside it have them: the value, or
+        recorded: Its time and pose, from the records beside it: the value, or
             the error of a damaged record.
         records_stamp: Changes when these records do.
-        file: Where it is on this machine while it is fetched.
+        file: Its path on this machine while it is fetched.
     """
 
     recorded: tuple[
@@ -108,8 +108,8 @@ class StoredBag(StoredFrame):
 
     Attributes:
         inner: The topic, as a part of a path; empty where the bag has only one of clouds.
-        by_name: Whether keys of clouds begin with the stem of the bag.
-        seconds: When the cloud was taken that it stands for; None where it stands for all.
+        by_name: True if keys of clouds begin with the stem of the bag.
+        seconds: Time of the cloud; None for all clouds.
         trajectory: Poses of the clouds, where they are given.
     """
 
@@ -162,8 +162,8 @@ class StoredBag(StoredFrame):
 
         Args:
             key: Its key.
-            name: What messages call it.
-            seconds: When it was taken, seconds; None where that is not known.
+            name: Its name in messages.
+            seconds: Its time, seconds; None if unknown.
         """
         return replace(self, key=key, path=path_of(name), seconds=seconds)
 

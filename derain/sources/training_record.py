@@ -61,7 +61,7 @@ def training_overlap(title: str, spec: Spec, card: DataCard, frames: Sequence[Fr
     """The warning about a model that was trained on some of the scans it is measured on.
 
     Args:
-        title: What the model is called.
+        title: Name of the model.
         spec: Its Spec.
         card: Data card of the scans.
         frames: The scans.

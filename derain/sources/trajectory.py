@@ -47,8 +47,8 @@ class Trajectory:
 
     Attributes:
         poses: Sensor to world, float64 (T, 4, 4), metres.
-        times: When it was there, seconds, ascending, float64 (T,); None where that is not known.
-        name: What messages call it, such as its file.
+        times: Times of the poses, seconds, ascending, float64 (T,); None if unknown.
+        name: Its name in messages, such as its file.
     """
 
     poses: NDArray[np.float64]
@@ -67,7 +67,7 @@ class Trajectory:
         """True if scans find their poses by time: both have times, of one clock it seems.
 
         Args:
-            times: When the scans were taken, seconds, (N,).
+            times: Times of the scans, seconds, (N,).
         """
         if self.times is None or not len(self.times) or not len(times):
             return False
@@ -268,7 +268,7 @@ def slerp(
     Args:
         first: Unit quaternion x, y, z, w, float64 (4,).
         second: The other one.
-        share: How far on the way, 0..1.
+        share: Share of the way, 0..1.
 
     Source: K. Shoemake, "Animating Rotation with Quaternion Curves", SIGGRAPH 1985.
     """

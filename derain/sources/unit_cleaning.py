@@ -28,10 +28,10 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
     """Cleans the scans of one unit after the other.
 
     Attributes:
-        destination: Where they are written, and what is written of them.
+        destination: Folder and form of the written scans.
         most_removed: Scans with a greater share of rain in their valid points are not written.
         measured: Keys of the scans whose weather is measured; None measures all.
-        finds_recordings: Whether only the unit shows which of its scans follow one another.
+        finds_recordings: True if only the unit shows which of its scans follow one another.
     """
 
     destination: Destination
@@ -64,11 +64,11 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
 
         Args:
             unit: The unit.
-            sink: Where they are written.
+            sink: The file or folder to write to.
             on_judgement: Receives each judgement.
 
         Yields:
-            What became of each scan.
+            Outcomes of all scans.
         """
 
         def result(frame: Frame, judgement: Judgement, stopwatch: Stopwatch) -> ScanOutcome:

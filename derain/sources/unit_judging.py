@@ -29,7 +29,7 @@ class UnitJudging(Work[FrameUnit, ResultT]):
     """Work that judges the scans of a unit one after the other.
 
     Attributes:
-        method: What judges them.
+        method: Method that judges them.
         fingerprint: That of the method where the job began.
         placing: Finds the poses of the scans; None leaves them as they are.
     """

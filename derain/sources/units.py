@@ -42,8 +42,8 @@ class Division:
     Attributes:
         block: Scans of a block of a long recording.
         shard: The shard of the units that is done; None for all.
-        keep_records: Whether records are kept even of fewer scans than a block has.
-        anew: Whether everything is done again, whatever the records of the folder are of.
+        keep_records: True if records are kept even of fewer scans than a block has.
+        anew: True if everything is done again, whatever the records of the folder are of.
     """
 
     block: int = BLOCK
@@ -68,7 +68,7 @@ class Division:
 
         Args:
             folder: The folder of the results.
-            options: What the results depend on but the inputs.
+            options: Options that the results depend on besides the inputs.
             units: All units.
 
         Returns:
@@ -146,7 +146,7 @@ def units_of(source: Sequence[Frame], method: Method | None, block: int = BLOCK)
 
     Args:
         source: Frames in time order, one recording after the other.
-        method: What judges them; None where each scan is seen by itself.
+        method: Method that judges them; None where each scan is seen by itself.
         block: Scans of a block.
 
     Returns:

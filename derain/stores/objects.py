@@ -147,7 +147,7 @@ def tried(url: str, request: Callable[[], Result]) -> Result:
     """The result of a request, which is tried several times.
 
     Args:
-        url: What it is about.
+        url: Subject of the message.
         request: Makes the request.
 
     Raises:

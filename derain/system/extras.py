@@ -45,7 +45,7 @@ class Extra:
         """Imports the library.
 
         Args:
-            subject: What needs it, for the message: a file, a command.
+            subject: The user of it, for the message: a file, a command.
             submodule: Name of a module within it to import instead.
 
         Raises:
@@ -104,7 +104,7 @@ def require(subject: str | Path, *extras: Extra) -> None:
     """Refuses work, before it begins, where libraries that it needs are not installed.
 
     Args:
-        subject: What needs them, for the message: a command, an option, a file.
+        subject: The user of them, for the message: a command, an option, a file.
         extras: The libraries; none is imported.
 
     Raises:

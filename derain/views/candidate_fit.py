@@ -89,10 +89,10 @@ class _Side:
 
     Attributes:
         channel: Name of the channel.
-        is_most: Whether it is that of large values.
+        is_most: True if it is that of large values.
         values: Those of all points, of the other side with their sign changed, float32 (M,); NaN
             where a point has none.
-        rain: Which points are rain, bool (M,).
+        rain: True for points of rain, bool (M,).
     """
 
     channel: str

@@ -72,7 +72,7 @@ def filled_values(
         scan: The scan.
         rows: Row numbers of points that are valid, int64 (M,).
         channels: Names of C channels.
-        fill_value: What stands in for a value that is missing, by channel; 0 if not named.
+        fill_value: Replacement of a missing value, by channel; 0 if not named.
 
     Returns:
         float32 (M, C), each channel in its own unit; finite where the stand-ins are.
@@ -100,7 +100,7 @@ def channel_image(
         scan: The scan.
         winner: Row of the point in each pixel, one that is valid, int64 (M,); -1 in empty pixels.
         channels: Names of C channels.
-        fill_value: What stands in for a value that is missing, by channel; 0 if not named.
+        fill_value: Replacement of a missing value, by channel; 0 if not named.
 
     Returns:
         float32 (C, M), finite; 0 in empty pixels.

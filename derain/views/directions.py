@@ -48,7 +48,7 @@ def shared_direction_pairs(xyz: NDArray[np.float32], evident: bool = True) -> ND
     Args:
         xyz: Finite and distinct positions other than the origin, float32 (M, 3), metres in the
             sensor frame.
-        evident: Whether pairs are none where so many could have come about by chance. Otherwise,
+        evident: True if pairs are none where so many could have come about by chance. Otherwise,
             such are those within the second smallest of TOLERANCES.
 
     Returns:

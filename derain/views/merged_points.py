@@ -30,7 +30,7 @@ def merged_points(
         xyz: Distinct positions in the sensor's frame, float32 (M, 3), metres.
         rows: Their rows in the scan, int64 (M,).
         neighbours: Of each point itself and its nearest neighbours, int64 (M, k).
-        distances: How far those are, float32 (M, k), metres.
+        distances: Their distances, float32 (M, k), metres.
 
     Returns:
         Of each return the point of the lowest row, int64 (R,), in the order of the points; and the
@@ -65,7 +65,7 @@ def are_one_return(
         xyz: Distinct positions in the sensor's frame, float32 (M, 3), metres.
         points: Rows of Q of them, int64 (Q,).
         neighbours: Of each of these itself and its nearest neighbours, int64 (Q, k).
-        distances: How far those are, float32 (Q, k), metres.
+        distances: Their distances, float32 (Q, k), metres.
 
     Returns:
         bool (Q, k - 1), of the neighbours.

@@ -137,10 +137,10 @@ class NeighbourView(View):
 
     Args:
         neighbours: k, the size of a neighbourhood, the point itself included.
-        channels: What the network sees of a point, in order, as :meth:`Scan.channel` names it.
-        fill_value: What stands in for a value that a scan lacks, by channel; 0 if not named.
+        channels: The network's input channels, in order, as :meth:`Scan.channel` names it.
+        fill_value: Replacement of a value that a scan lacks, by channel; 0 if not named.
         threads: Threads of the search; 0 takes every core this process may use.
-        candidates: Which points are scored; None for all.
+        candidates: Points that are scored; None for all.
     """
 
     neighbours: int = 9
@@ -197,7 +197,7 @@ def _around(
 
     Args:
         search: Finds neighbours among M points.
-        candidate: Which of them are candidates, bool (M,).
+        candidate: True for candidates, bool (M,).
         k: Size of a neighbourhood.
 
     Returns:

@@ -142,12 +142,12 @@ class RangeView(View):
 
     Args:
         grid: Rows and columns of the image.
-        channels: What a pixel holds, in order, as :meth:`Scan.channel` names it.
+        channels: Channels of a pixel, in order, as :meth:`Scan.channel` names it.
         back_projection: Name of the back-projection, by which points that lost their pixel get a
             score: ``nearest range``, ``copy`` or ``vote``. A Spec has it under the key
                 ``back_projection``.
-        fill_value: What stands in for a value that a scan lacks, by channel; 0 if not named.
-        candidates: Which points are scored; None for all. The image shows the others all the same.
+        fill_value: Replacement of a value that a scan lacks, by channel; 0 if not named.
+        candidates: Points that are scored; None for all. The image shows the others all the same.
 
     Raises:
         InputError: An unknown back-projection.

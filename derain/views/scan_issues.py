@@ -34,8 +34,8 @@ class ScanIssue:
     """One thing about a scan that may not suit a method.
 
     Attributes:
-        kind: What it is, in the same words for every scan that has it.
-        detail: How it shows in this one.
+        kind: Kind of issue, with the same text for every scan.
+        detail: Description of the issue in this scan.
     """
 
     kind: str
@@ -77,7 +77,7 @@ def missing_intensity(
 
     Args:
         scan: The scan.
-        consequence: What that means for the method.
+        consequence: Its effect on the method.
     """
     if scan.measured_intensity is None and scan.valid.any():
         lack, detail = _lack(scan)

@@ -214,7 +214,7 @@ def grid_of(config: str | Mapping[str, Any], source: str | Path) -> SphericalGri
         config: Name of a published grid; or a mapping with ``columns``, ``azimuth`` (right and
             left bound; all around by default) and how the rows lie: ``rows`` and ``inclination``
             (lower and upper bound), or ``beams``, or ``edges``. Degrees.
-        source: Where it was found, for messages.
+        source: Source of the entry, for messages.
 
     Raises:
         InputError: An unknown name, or something that does not describe a grid.

@@ -92,7 +92,7 @@ class View(ABC):
 
     Attributes:
         NAME: Its name in a Spec; the decorator sets it.
-        WEIGHS_INTENSITY: Whether it shows how bright points are, whatever the channels.
+        WEIGHS_INTENSITY: True if it shows how bright points are, whatever the channels.
     """
 
     NAME: ClassVar[str]
@@ -106,9 +106,9 @@ class View(ABC):
         """Reads back what :meth:`as_dict` gave. It is not trusted.
 
         Args:
-            entry: What stands under ``view`` in a Spec.
-            channels: What the network sees of a point, in order, as :meth:`Scan.channel` names it.
-            fill_value: What stands in for a value that a scan lacks, by channel.
+            entry: The entry ``view`` of a Spec.
+            channels: The network's input channels, in order, as :meth:`Scan.channel` names it.
+            fill_value: Replacement of a value that a scan lacks, by channel.
             threads: Threads that it may use; 0 takes every core this process may use.
 
         Raises:
@@ -136,7 +136,7 @@ class View(ABC):
         is seen as before. A view that cannot tell them apart refuses, as this one does.
 
         Args:
-            candidates: Which points may be rain.
+            candidates: Points that may be rain.
 
         Raises:
             InputError: A view that sees every point alike.

@@ -64,11 +64,11 @@ class Latch:
     """One level, on or off.
 
     Attributes:
-        threshold: Where it begins, and where it ends.
-        hold: So many scans in a row change it.
-        on: Whether it is on.
-        against: How many of the last scans in a row speak for a change; before the first scan one
-            less than ``hold``, so that it alone can change the level.
+        threshold: The bounds at which it begins and ends.
+        hold: Number of consecutive scans that change it.
+        on: True if it is on.
+        against: Number of consecutive scans so far that agree on a change; before the first scan
+            one less than ``hold``, so that it alone can change the level.
     """
 
     threshold: Threshold
@@ -112,9 +112,10 @@ class Alarm:
         ['clear', 'clear', 'error', 'error', 'error', 'error', 'clear']
 
     Args:
-        warning: Where the warning begins and ends.
-        error: Where the error does.
-        hold: How many scans in a row have to agree before the level changes; 1 changes at once.
+        warning: Bounds of the warning.
+        error: Bounds of the error.
+        hold: Number of consecutive scans that have to agree before the level changes; 1 changes at
+            once.
         dry: The reach of the same sensor in dry scans of the same kind of place
             (:func:`~derain.weather.scan_weather.dry_reach`); None leaves reach out.
 

@@ -48,7 +48,7 @@ class ScanWeather:
 
         Args:
             points: A Scan, or (N, ≥ 3) numbers: x, y, z in metres, in the frame of the sensor.
-            rain: What is rain of it by labels or by any method, bool (N,).
+            rain: Its rain by labels or by any method, bool (N,).
 
         Raises:
             InputError: Points of another shape, or not one answer for each.
@@ -155,7 +155,7 @@ def dry_reach(dry: Iterable[ScanWeather]) -> Visibility:
     them. Not known where none of them has 100 rays.
 
     Args:
-        dry: What each dry scan shows.
+        dry: Weather of each dry scan.
     """
     known = sorted((one.reach for one in dry if one.reach.known), key=lambda reach: reach.at_least)
     return known[int(SHARE_OF_DRY_BELOW * len(known))] if known else NOT_KNOWN

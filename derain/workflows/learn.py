@@ -50,7 +50,7 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
         derain.errors.InputError: scan.bin: 1 scan: too few to learn from ...
 
     Args:
-        config: What is learnt from what.
+        config: Options of the run.
         show: Receives a line for each step, and one for its result.
 
     Returns:
@@ -118,7 +118,7 @@ def commands(config: LearnConfig, student: Student, source: Source, poses: str |
     """Commands that repeat the steps of :func:`learn`.
 
     Args:
-        config: What is learnt.
+        config: Options of the run.
         student: The network that learns.
         source: The scans.
         poses: Poses that the teacher is given; None for those beside the scans.

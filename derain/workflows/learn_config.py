@@ -43,7 +43,7 @@ class LearnConfig:
         teacher: Name of the teacher, or the file of a model.
         poses: Poses of the scans, as the option ``--poses`` takes them; None for those beside the
             scans, and for odometry where there are none.
-        blind: Whether the network learns without intensity.
+        blind: True if the network learns without intensity.
         columns: Names of the columns of files that do not name them.
         epochs: Epochs of the training; None for those of the network's configuration.
         card: Data card of the scans' own labels, which measure the finished model; None measures
@@ -107,7 +107,7 @@ class Student:
 
     Attributes:
         network: Its name.
-        blind: Whether it sees no intensity.
+        blind: True if it sees no intensity.
         start: The trained model that it begins with; None where its weights are drawn at random.
         config: The packaged configuration of its training.
         settings: Settings of the network over that configuration, as
@@ -137,7 +137,7 @@ def student_of(config: LearnConfig, source: Source) -> Student:
     """The network that learns from a recording: one with a start sees what that sees.
 
     Args:
-        config: What is learnt.
+        config: Options of the run.
         source: The scans; without intensities, the student is blind to them.
 
     Raises:

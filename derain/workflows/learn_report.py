@@ -59,10 +59,10 @@ class LearnResults:
         evaluated: The student's answers beside them on held-out scans; none before it is trained.
         persistence: Persistence's answers on held-out scans, and beside them what the teacher calls
             rain; None where they are not compared.
-        stood: Whether the sensor stood, by the configuration.
-        sees_intensity: Whether the student does, in the unit of this recording.
+        stood: True if the sensor was at rest, by the configuration.
+        sees_intensity: True if the student does, in the unit of this recording.
         warnings: Warnings of all steps, in order.
-        pictures: What each picture shows, by file in the folder of the report.
+        pictures: Title of each picture, by file in the folder of the report.
         record: Scores by the scans' own labels, in Markdown; empty where none were measured.
         commands: Commands that repeat the steps.
     """

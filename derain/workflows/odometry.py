@@ -40,10 +40,10 @@ class FoundPoses:
     """The poses of one recording; as text, a summary in one line.
 
     Attributes:
-        file: Where they are written.
+        file: The file or folder to write to.
         frames: The scans, in time order.
-        registrations: How each scan was registered, one a scan.
-        times: When the scans were taken, seconds; empty where that is not known of all.
+        registrations: Registration of each scan.
+        times: Times of the scans, seconds; empty unless all are known.
         fault: Why the file could not be written; None where it is.
     """
 
@@ -94,9 +94,9 @@ def find_poses(
     Args:
         source: Scans of one recording or more, in time order.
         out: The file of the only recording; of several, a folder with ``<sequence>.txt`` for each.
-        form: What a line of a file is: ``kitti``, twelve numbers of a matrix, or ``tum``, time,
+        form: Format of a line of a file: ``kitti``, twelve numbers of a matrix, or ``tum``, time,
             position and quaternion.
-        replace: Whether poses that came with the scans may be replaced.
+        replace: True if poses that came with the scans may be replaced.
         threads: Threads to use; 0 takes every core.
         guard: Surrounds the reading of each scan; one whose error it holds back is not trusted.
         watch: Receives each registration.
@@ -189,7 +189,7 @@ def _files_of(recordings: Sequence[Sequence[Frame]], out: Path, replace: bool) -
     Args:
         recordings: The recordings.
         out: The file of the only one; of several, a folder with ``<sequence>.txt`` for each.
-        replace: Whether poses that came with the scans may be replaced.
+        replace: True if poses that came with the scans may be replaced.
 
     Raises:
         InputError: A file that cannot be written, that came with the scans, or that two recordings

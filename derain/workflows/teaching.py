@@ -23,7 +23,7 @@ class TeachResults:
 
     Attributes:
         manifest: The labelled scans, as written; not finished while other shards are to be done.
-        judged: How many scans were judged; those of which nothing is known have no labels.
+        judged: Number of judged scans; those of which nothing is known have no labels.
         answers: Counts of the labels by range.
         record: Scores by the scans' own labels; None where there is no card.
     """
@@ -60,7 +60,7 @@ def teach_recordings(
         card: Data card of the scans, whose own labels measure the teacher's; they change nothing.
         guard: Surrounds the work on each scan; one whose error it holds back gets no labels.
         watch: Receives each scan.
-        division: How the scans are divided into units; see :func:`derain.annotation.teach.teach`.
+        division: Division of the scans into units; see :func:`derain.annotation.teach.teach`.
         executor: Does the units; None does them in this process.
         placing: Finds where the scans were taken; see :func:`derain.annotation.teach.teach`.
 

@@ -46,7 +46,7 @@ class Cost:
         peak_memory: Largest resident memory of a process that does this alone, in MiB, Python and
             its libraries included; None where it is not known, or the process did more.
         failure: The error that stopped it, if any; there are no runs then.
-        alone: Whether it was measured in a process of its own.
+        alone: True if it was measured in a process of its own.
     """
 
     times: RunTimes

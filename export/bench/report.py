@@ -48,7 +48,7 @@ def write_report(rows: Sequence[Row], facts: Mapping[str, Any], out: Path) -> No
 
     Args:
         rows: The rows of the table.
-        facts: What the bench depends on besides its methods, as :class:`.bench.Bench` has it.
+        facts: Facts that the bench depends on besides its methods, as :class:`.bench.Bench` has it.
         out: The folder, made if missing.
 
     Raises:
@@ -136,7 +136,7 @@ def draw_speed_error(rows: Sequence[Row], facts: Mapping[str, Any], path: Path) 
 
     Args:
         rows: The rows of the table.
-        facts: What the bench depends on besides its methods, as :class:`.bench.Bench` has it.
+        facts: Facts that the bench depends on besides its methods, as :class:`.bench.Bench` has it.
         path: PNG file to write.
 
     Raises:

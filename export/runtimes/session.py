@@ -51,8 +51,8 @@ class Session(ABC):
     Attributes:
         NAME: The runtime's name; the decorator sets it.
         PACKAGE: The package that it is installed by, whose version a report of times states.
-        PRECISIONS: What it can compute in, on some processors at least.
-        DROPS_UNUSED_INPUTS: Whether ``inputs`` leaves out what the network has no use for.
+        PRECISIONS: Supported precisions, on some processors at least.
+        DROPS_UNUSED_INPUTS: True if ``inputs`` leaves out what the network has no use for.
 
     Raises:
         InputError: A runtime that is not installed, a graph that it cannot run, or a precision that

@@ -50,7 +50,7 @@ class DrawnEpochs:
     validations as the one before it. Of an epoch with several validations, the first is drawn.
 
     Args:
-        pictures: How many epochs are drawn in a training whose length is known.
+        pictures: Number of epochs that are drawn in a training whose length is known.
     """
 
     def __init__(self, pictures: int) -> None:
@@ -86,8 +86,8 @@ class ScanPanels(lightning.Callback):
     pictures. So ten of the epochs are drawn, chosen by :class:`DrawnEpochs`.
 
     Args:
-        scans: How many scans to show; 0 shows none.
-        pictures: How many pictures of each to draw in a training.
+        scans: Number of scans to show; 0 shows none.
+        pictures: Number of pictures of each to draw in a training.
     """
 
     def __init__(self, scans: int = 2, pictures: int = 10) -> None:

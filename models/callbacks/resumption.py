@@ -108,7 +108,7 @@ def matching_state(found: Entry, own: Any) -> Any:
     Lightning and torch enter whatever a checkpoint holds into their own objects.
 
     Args:
-        found: What stands in the checkpoint. It is not trusted.
+        found: The state in the checkpoint. It is not trusted.
         own: The state of the same object before it is restored.
 
     Returns:

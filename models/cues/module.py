@@ -48,10 +48,10 @@ class CueFusion(SupervisedModule):
             training.
         learning_rate: Of AdamW, where it is highest.
         weight_decay: Of AdamW.
-        final_share: How much of the learning rate is left at the end; above 0 where weights are
+        final_share: Share of the learning rate at the end; above 0 where weights are
             averaged over the last part of the training.
         threshold: A point is rain where its probability is greater.
-        balance: How far the rarer class counts for more: 0 not at all, so that a point wrongly
+        balance: Extra weight of the rarer class: 0 not at all, so that a point wrongly
             called rain counts for no less than one that is missed; 1 by the inverse of its share.
         spec: Set by derain when it saves a checkpoint; leave it out otherwise.
 

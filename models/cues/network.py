@@ -273,7 +273,7 @@ def calibrated(counts: Tensor, cell: Tensor, probability: Tensor) -> Brightness:
     Args:
         counts: Points of the scan by shell and rank, float (SHELLS, INTENSITY_RANKS).
         cell: Shell and rank of those that may be rain, int64 (S,).
-        probability: How probably each is, float (S,).
+        probability: Their probabilities of rain, float (S,).
     """
     # In float64, for sums of float32 over a whole scan differ from one runtime to another.
     rain = counts.new_zeros(counts.numel(), dtype=torch.float64)

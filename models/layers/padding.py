@@ -16,8 +16,8 @@ def pad_to_multiple(image: Tensor, multiple: int, value: float) -> Tensor:
 
     Args:
         image: Image, (B, channels, H, W).
-        multiple: What both sides shall be multiples of, in pixels.
-        value: What the new pixels hold, in every channel.
+        multiple: Divisor of both sides, in pixels.
+        value: Value of the new pixels, in every channel.
 
     Returns:
         Image of the same dtype, (B, channels, ≥ H, ≥ W).

@@ -46,7 +46,7 @@ class DeployedLiSnowNet(nn.Module):
 
     Args:
         network: A trained network.
-        rule: What it calls rain.
+        rule: Its rule of rain.
     """
 
     def __init__(self, network: LiSnowNetwork, rule: SelectionRule) -> None:
@@ -76,7 +76,7 @@ class LiSnowNet(DerainingModule, Published):
             nearer one get a score: ``nearest range``, ``copy`` or ``vote``.
         width: Channels of the features at full size, 8 as published.
         dropout: Share of feature maps dropped in training.
-        alpha: How much sparsity counts against the residual: it weighs 1 - 2^-alpha.
+        alpha: Weight of sparsity against the residual: it weighs 1 - 2^-alpha.
         beta: Share of the wavelet part in sparsity.
         norm: Norm of the residual: ``l1`` as published, or ``l2``.
         learning_rate: Of Adam.

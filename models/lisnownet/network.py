@@ -163,7 +163,7 @@ class LiSnowNetwork(nn.Module):
         Args:
             image: Cube roots of range in metres and of intensity in 0..1, float (B, 2, H, W). What
                 empty pixels hold does not matter.
-            valid: Which pixels hold a return, bool (B, 1, H, W).
+            valid: True for pixels with a return, bool (B, 1, H, W).
 
         Returns:
             The image as it would be without snow or rain, in the same units, a value in every
@@ -266,7 +266,7 @@ def fill_holes(image: Tensor, valid: Tensor) -> Tensor:
 
     Args:
         image: float (B, channels, H, W). Values where nothing is valid are never looked at.
-        valid: Which pixels hold a return, bool (B, 1, H, W).
+        valid: True for pixels with a return, bool (B, 1, H, W).
 
     Returns:
         float32 or wider, (B, channels, H, W).

@@ -148,8 +148,8 @@ def rain_logits(
     Args:
         image: Range (m), z (m) and intensity (the data's unit), float (B, 3, H, W).
         valid: Pixels with a return, bool (B, 1, H, W).
-        seen: What the network saw, float (B, 2, H, W).
-        denoised: What it made of that, float (B, 2, H, W).
+        seen: Input of the network, float (B, 2, H, W).
+        denoised: Output of the network, float (B, 2, H, W).
         rule: The rule.
     """
     excess = denoising_change(seen, denoised) / rule.residual - 1

@@ -38,10 +38,10 @@ def sparsity_loss(
     With w = 1 - 2^-alpha the total is w (beta wavelet + (1 - beta) fourier) + (1 - w) residual.
 
     Args:
-        denoised: What the network made of the images, float (B, C, H, W), any size.
+        denoised: Output of the network for the images, float (B, C, H, W), any size.
         image: The images, float (B, C, H, W); what empty pixels hold does not matter.
-        valid: Which pixels hold a return, bool (B, 1, H, W).
-        alpha: How much sparsity counts against the residual, at least 0.
+        valid: True for pixels with a return, bool (B, 1, H, W).
+        alpha: Weight of sparsity against the residual, at least 0.
         beta: Share of the wavelet part in sparsity, 0 to 1.
         norm: Norm of the residual, one of ``RESIDUALS``.
     """

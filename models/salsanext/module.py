@@ -64,7 +64,7 @@ class SalsaNextModule(SupervisedModule):
             one, or its bounds.
         back_projection: Name of the back-projection, by which points that lost their pixel to a
             nearer one get a score: ``nearest range``, ``copy`` or ``vote``.
-        channels: What it sees of a point: ``range``, ``x``, ``y``, ``z``, ``intensity``, ``radar``,
+        channels: Input channels: ``range``, ``x``, ``y``, ``z``, ``intensity``, ``radar``,
             or other columns of the scans, such as ``doppler``.
         width: Channels of the first layers, 32 as published; all others are multiples of it.
         dropout: Share of feature maps dropped in training.
@@ -78,7 +78,7 @@ class SalsaNextModule(SupervisedModule):
         threshold: A point is rain where its probability is greater.
         candidates: Share of the training scans' rain that must lie within a few bounds (range,
             height, intensity), outside which nothing is learnt from or called rain; None for none.
-        balance: How far the rarer class counts for more: 1 by the inverse of its share, as
+        balance: Extra weight of the rarer class: 1 by the inverse of its share, as
             published; 0 not at all, as suits labels with errors, whose few points called rain by
             mistake would count for many.
         spec: Set by derain when it saves a checkpoint; leave it out otherwise.

@@ -181,7 +181,7 @@ def test_what_is_interrupted_while_it_is_put_in_place_is_known(
 def test_where_nothing_is_known_or_scans_are_in_no_file_nothing_is_written(
     make_drive: MakeDrive, tmp_path: Path
 ) -> None:
-    with pytest.raises(InputError, match="of no point it is known whether it is rain"):
+    with pytest.raises(InputError, match="is sure of no point"):
         teach(Between(Dimmer(sure_within=0.0)), of(make_drive()), tmp_path / "out")
     in_memory = Frames.of_scans([Scan.of(scene(9), name="mine")] * 3)
     with pytest.raises(InputError, match="is in no file"):

@@ -42,7 +42,7 @@ class FeatherHeader:
 
     Attributes:
         table: The file, a pyarrow.Table with a row for each point.
-        compression: How it is compressed: "uncompressed", "lz4" or "zstd".
+        compression: Its name: "uncompressed", "lz4" or "zstd".
     """
 
     table: Any
@@ -132,7 +132,7 @@ def _check_messages(arrow: ModuleType, stream: bytes, budget: MemoryBudget) -> s
     Args:
         arrow: PyArrow.
         stream: The messages.
-        budget: What there is.
+        budget: The available memory.
 
     Returns:
         How they are compressed: "uncompressed", "lz4" or "zstd".

@@ -221,7 +221,7 @@ def _check_chunks(content: Content, record: bytes, size: int, begin: int) -> Non
         content: The file.
         record: The variable-length record of how the points are compressed.
         size: Bytes of a point.
-        begin: Where the compressed points begin.
+        begin: Begin of the compressed points.
 
     Raises:
         ValueError: Points of another size than the header's, more chunks than the file can hold, or

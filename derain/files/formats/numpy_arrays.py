@@ -37,7 +37,7 @@ class NpzHeader:
         constants: Arrays that are not one value per point, e.g. the angles of the beams.
         table: Name of the array that holds several columns, if there is one.
         columns: Their names.
-        structured: Whether they are named fields of that array.
+        structured: True if they are named fields of that array.
     """
 
     constants: Mapping[str, NDArray[Any]]

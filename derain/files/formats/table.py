@@ -47,11 +47,11 @@ class TableHeader:
     """A table as it was written.
 
     Attributes:
-        separator: What stands between the values of a line; None for white space.
-        named: Whether a line of the file names the columns.
+        separator: Separator of the values of a line; None for white space.
+        named: True if a line of the file names the columns.
         text: The whole file.
-        begin: Where its lines of points begin.
-        spans: Where each point's line begins and ends in the text, in bytes, int64 (N, 2).
+        begin: Begin of its lines of points.
+        spans: Begin and end of each point's line in the text, in bytes, int64 (N, 2).
         columns: Name → numbers of these lines, (N,).
     """
 
@@ -219,8 +219,8 @@ def _parse_lines(
 
     Args:
         lines: The lines.
-        separator: What stands between the values; None for white space.
-        titles: What the columns are called, for messages.
+        separator: Separator of the values; None for white space.
+        titles: Names of the columns, for messages.
 
     Raises:
         ValueError: Lines of different lengths, or values that are not numbers.

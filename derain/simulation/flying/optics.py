@@ -132,7 +132,7 @@ class Slices:
     particles count that would be seen in the middle of the beam.
 
     Args:
-        near: Where the first slice begins, metres.
+        near: Begin of the first slice, metres.
         optics: The beams.
         sizes: Of the particles.
     """

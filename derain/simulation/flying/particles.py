@@ -60,8 +60,8 @@ class Stretch:
     """The part of each beam where particles of some kind may be.
 
     Attributes:
-        near: Where it begins, float64 (N,), metres.
-        far: Where it ends, float64 (N,), metres; before ``near`` where the beam has none.
+        near: Begin of the stretch, float64 (N,), metres.
+        far: End of the stretch, float64 (N,), metres; before ``near`` where the beam has none.
     """
 
     near: Floats
@@ -79,7 +79,7 @@ class OpenBeams:
     Attributes:
         directions: Unit vectors along them, float64 (N, 3), sensor frame.
         stretch: From the minimum range to the surfaces.
-        optics: What the sensor sees of particles in them.
+        optics: Optics of the sensor for particles in them.
     """
 
     directions: Floats

@@ -48,7 +48,7 @@ class Precipitation(Settings):
         gust_form: How the density varies in space.
         gust_length: Over which length it does, metres.
         gust_contrast: How sharply it does.
-        gust_seed: Where its waves run.
+        gust_seed: Directions of its waves.
         drift: Particles that drift at the ground over those that fall.
         drift_height: Height over which their density falls to 1/e, metres.
         plumes: How many cars raise spray, where so many are seen.
@@ -136,23 +136,23 @@ class Kind(Settings):
         reflectivity: In 0..1.
         flicker: At most below 1.
         spill: From 1 on.
-        reach_chance: How often the reach is stated; else the sensor's threshold gives it.
+        reach_chance: Probability of a stated reach; else the sensor's threshold gives it.
         reach: Metres.
         nearest: Metres.
-        cut_off_chance: How often there is a plain cut-off.
+        cut_off_chance: Probability of a plain cut-off.
         cut_off: Metres.
         crowding: Detectable particles that an open beam meets on average, at most.
         jitter: Metres.
-        gust_chance: How often the density is uneven.
+        gust_chance: Probability of uneven density.
         gust_length: Metres.
         gust_contrast: From soft to sharp.
-        drift_chance: How often particles drift along the ground.
+        drift_chance: Probability of particles drifting along the ground.
         drift: Over those that fall.
         drift_height: Metres.
-        plume_chance: How often cars raise spray; where they do, one to three of them.
+        plume_chance: Probability of spray behind cars; where they do, one to three of them.
         plume_number: m⁻³.
         plume_length: Metres.
-        haze_chance: How often there is haze.
+        haze_chance: Probability of haze.
         haze: Share of the beams.
         haze_depth: Metres.
         haze_strength: Times the threshold.

@@ -21,7 +21,7 @@ class Section:
 
     Attributes:
         kerbs: Where the roadway ends, on the right and on the left; parked cars included.
-        fronts: Where the houses begin.
+        fronts: Begin of the houses.
     """
 
     kerbs: tuple[float, float]
