@@ -46,8 +46,8 @@ def scan_loader(
     Args:
         source: The scans, with their labels where they have any.
         part: Part that they are read for. Training has a new order and augmentation every epoch:
-            call the sampler's ``set_epoch``, as a trainer does. The other parts are read in order and
-            unchanged; for prediction without labels and with all rows.
+            call the sampler's ``set_epoch``, as a trainer does. The other parts are read in order
+            and unchanged; for prediction without labels and with all rows.
         task: Agreement of model and data.
         loading: Options for batching scans. The source has the columns of files.
         processes: Number of processes that share the scans.
@@ -68,7 +68,7 @@ def scan_loader(
     reader = FrameReader(task.card, loading.intensity_scale, task.columns)
     once = loading.counts_once(task.card)
     augmented = part == "train" and loading.augmentation.changes_anything
-    # Tests and predictions ask for each scan once.
+    # Tests and predictions read each scan once.
     room = loading.cache_mb * MEGABYTE if part in ("train", "validation") else 0
     dataset = ScanDataset(
         # Frames to predict keep the path of their labels: predictions must not overwrite them.

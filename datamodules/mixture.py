@@ -31,7 +31,7 @@ class Mixture(ScanDataModule):
 
     Each part's own ``loading`` determines how its files are read (columns, unit of intensity);
     batches, workers and augmentation are the mixture's. Points at one position are measured once
-    if any part's card asks for it.
+    if any part's card requires it.
 
     Example:
         >>> from derain.datamodules.folder import Folder

@@ -43,7 +43,7 @@ class Draws:
 
     Attributes:
         scans: Number of scans of each data set, in order.
-        drawn: How many of them an epoch draws, in the same order.
+        drawn: Number of scans that an epoch draws of each, in the same order.
     """
 
     scans: tuple[int, ...]
@@ -127,7 +127,7 @@ class TrainingOrder(DistributedSampler[Pick]):
         draws: Draws | None = None,
     ) -> None:
         drawn = len(scans) if draws is None else sum(draws.drawn)
-        # The base class only asks for the number of scans.
+        # The base class only needs the number of scans.
         super().__init__(cast("ScanDataset", range(drawn)), processes, process, seed=seed)
         self.scans = len(scans)
         self.draws = draws

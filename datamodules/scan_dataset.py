@@ -114,10 +114,10 @@ class ScanDataset(Dataset[Sample | InputError]):
 
 
 class Cache:
-    """Items by number, as many as there is room for.
+    """Items by number, as many as fit into memory.
 
-    The first items stay. Every epoch asks for each item once: a cache that evicted the oldest would
-    have evicted each item by the time it is asked for again.
+    The first items stay. Every epoch needs each item once: a cache that evicted the oldest would
+    have evicted each item before its next use.
 
     Args:
         room: Bytes that the arrays of all items together may fill.

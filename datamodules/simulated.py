@@ -68,7 +68,7 @@ class Simulated(SimulatedDataModule):
     Simulated rain is easy to find: scores on it are no evidence of quality on real rain.
 
     Example:
-        >>> data = Simulated("rain")  # nothing is simulated before training asks for it
+        >>> data = Simulated("rain")  # nothing is simulated before training needs it
         >>> data.split["validation"]
         ['016', '017', '018', '019']
 

@@ -11,7 +11,7 @@ class Worlds(SimulatedDataModule):
     They train models for sensors and places that are not in any training data.
 
     Example:
-        >>> data = Worlds("worlds")  # nothing is simulated before training asks for it
+        >>> data = Worlds("worlds")  # nothing is simulated before training needs it
         >>> len(data.split["train"]), data.split["validation"][0]
         (1000, '01000')
 

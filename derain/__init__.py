@@ -37,7 +37,7 @@ def _table() -> dict[str, str]:
 
 _MODULE_OF = _table()
 
-# Packages whose modules train networks, and what they are made of.
+# Packages whose modules train networks, and the libraries that they need.
 _TRAINING = (
     *("derain.models.", "derain.datamodules."),
     *("derain.workflows.fit", "derain.workflows.learn"),

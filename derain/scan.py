@@ -57,7 +57,7 @@ class PartialHeader(Protocol):
 class Scan:
     """One point cloud, in the order of its file; rows are never dropped or reordered.
 
-    A scan copies the arrays that it is given, so that a buffer may be filled anew while scans made
+    A scan copies the arrays that it is given, so that a buffer may be filled again while scans made
     of it are in use.
 
     Example:

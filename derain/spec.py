@@ -129,7 +129,7 @@ class Spec:
             threads: Threads it may use; 0 takes every core this process may use.
 
         Raises:
-            InputError: A kind of view that this derain does not know, or that has no candidates.
+            InputError: An unknown kind of view, or one without candidates.
         """
         return _view_of(Entry(self.network, "view", dict(self.view)), self, threads)
 

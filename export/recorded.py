@@ -1,4 +1,4 @@
-"""A model over a recording: what it makes of each scan, and the rays of the scans around it."""
+"""A model over a recording: its answers for each scan, with the rays of the scans around it."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -94,7 +94,7 @@ class RecordedDerainer(Method):
         return self.window if are_placed(recording) else None
 
     def fingerprint(self) -> str:
-        """A fingerprint of the model, and of how many scans around one it sees."""
+        """A fingerprint of the model, and of the number of scans around one that it sees."""
         seen = f"{self.model.fingerprint()} {self.window.before} {self.window.after}"
         return sha256(seen.encode()).hexdigest()[:16]
 

@@ -81,7 +81,7 @@ class SharedTrials:
             running = [trial for trial in trials if not trial.state.is_finished()]
             if len(trials) - len(running) >= most:
                 return None
-            # At the end those of other searches, too: nobody knows whether they are still there.
+            # At the end those of other searches, too: they may have ended.
             all_are_drawn = len(trials) >= most
             for trial in running:
                 if trial.number in self._left or all_are_drawn:

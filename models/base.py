@@ -42,7 +42,7 @@ class DerainingModule(MeasuredModule):
     Attributes:
         NAME: Name of the network in a Spec and on the command line; the decorator sets it.
         VIEW: Kind of the view that it sees a scan through.
-        LOGIT_GAIN: How many times more than other networks' its logits amplify rounding.
+        LOGIT_GAIN: Amplification of rounding in its logits, relative to other networks.
         RECIPE: Names of the arguments of its training and of what is called rain. One that
             starts from another model keeps its own, and has the other's in place of all the rest.
         INTEGER_OPERATORS: Operators in eight bits of a model that is exported so; ONNX names.
@@ -147,7 +147,7 @@ class DerainingModule(MeasuredModule):
             rule: The entry ``rule`` of the Spec. It is not trusted.
 
         Raises:
-            InputError: Constants that the network does not know, or some of its own missing.
+            InputError: Unknown constants, or some of its own missing.
         """
         if rule.members():
             raise rule.fault(
@@ -174,7 +174,7 @@ class DerainingModule(MeasuredModule):
         self.load_state_dict(source.state_dict())
 
     def deployed(self) -> nn.Module:
-        """The network as it is exported, in evaluation mode: from raw inputs to logits.
+        """The network for export, in evaluation mode: from raw inputs to logits.
 
         By default the module itself. What can be computed once, such as a BatchNorm that follows a
         convolution, a network may fold away here.

@@ -208,7 +208,7 @@ def read_scene(path: Path) -> Scene:
                 raise InputError(
                     f"{path}: corrections.{sequence}.boxes.{name}",
                     "there is no such box",
-                    f"Known are {', '.join(scene.boxes)}.",
+                    f"Available: {', '.join(scene.boxes)}.",
                 )
     return scene
 

@@ -92,7 +92,7 @@ def within(paths: Iterable[Path], topic: str | None) -> list[Path]:
     """The same paths, where a topic is appended to those of bags.
 
     Args:
-        paths: Bags and whatever else.
+        paths: Bags and any other paths.
         topic: The topic; None leaves the paths as they are.
 
     Raises:

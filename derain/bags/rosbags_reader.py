@@ -1,4 +1,4 @@
-"""Opens bags of ROS 1 and SQLite by the library, with bounds on what it unpacks and reads."""
+"""Opens bags of ROS 1 and SQLite with rosbags, with bounds on the sizes that it reads."""
 
 import os
 from collections import Counter

@@ -113,7 +113,7 @@ def _ros1(reader: Any, path: Path) -> Any:
 def _lz4_of_ros1(data: bytes) -> bytes:
     """Compresses a chunk in the way that ROS 1 can read.
 
-    Source: roslz4, which refuses linked blocks, wants a checksum, and knows no size of the content.
+    Source: roslz4, which refuses linked blocks and a size of the content, and requires a checksum.
     """
     packed: bytes = LZ4.load("bags", "frame").compress(
         data, block_linked=False, content_checksum=True, store_size=False

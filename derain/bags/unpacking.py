@@ -1,7 +1,6 @@
 """Unpacks compressed chunks, messages and files of bags, up to a size.
 
-A few kilobytes may unpack to more than there is memory, and the libraries that read bags unpack
-whatever they find.
+A few kilobytes may unpack to more than the memory, and the libraries that read bags have no bound.
 """
 
 import atexit

@@ -38,7 +38,7 @@ class DataCard:
         name: Name of the data set, for tables and models.
         classes: Names of its semantic classes, by id.
         rain: Ids of the classes that are to be removed; none where the data are clean.
-        unknown: Ids of the classes of which it is not known whether they are rain: neither trained
+        unknown: Ids of the classes that may or may not be rain: neither trained
             on nor measured by.
         licence: Licence of the data.
         intensity_unit: Unit or span of its intensities, such as ``0..255``.

@@ -119,7 +119,7 @@ def main(arguments: argparse.Namespace) -> int:
         scale = scans.loading.intensity_scale
         return LabelledFrames(scans.card, frames, scale, scans.distinct, rates)
 
-    # Read only when they are asked for: a bench without such a baseline needs no training scans.
+    # Read at their first use: a bench without such a baseline needs no training scans.
     methods = bench_entries(
         arguments.methods,
         (lambda: labelled_frames(training, _frames(training, "train")).truths())

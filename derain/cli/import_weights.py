@@ -54,7 +54,7 @@ def main(arguments: argparse.Namespace) -> int:
     published = {known: kind for known, kind in NETWORKS.items() if issubclass(kind, Published)}
     if name not in published:
         reason = "no weights of it were published" if name in NETWORKS else "no such network"
-        known = f"{did_you_mean(name, published)}Known are {', '.join(published)}."
+        known = f"{did_you_mean(name, published)}Available: {', '.join(published)}."
         raise InputError(name, reason, known)
     stats = load_card(arguments.stats)
     data = stats if arguments.data is None else load_card(arguments.data)

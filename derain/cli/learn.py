@@ -8,7 +8,7 @@ describes how far to trust it, with the commands that repeat each step.
   derain learn recording/ --out model.onnx --poses standing    the sensor stood still
   derain learn recording/ --out model.onnx --teacher persistence
   derain learn recording/ --out model.onnx --model salsanext --blind
-  derain learn recording/ --out model.onnx --start mine.ckpt   go on from a model of yours
+  derain learn recording/ --out model.onnx --start mine.ckpt   start from a model of yours
   derain learn recording/ --out model.onnx --rerun report.rrd  look at teacher and student
   derain learn drive.mcap --out model.onnx --topic /velodyne_points
   derain run model.onnx more_scans/ --out cleaned              use the model

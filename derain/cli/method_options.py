@@ -40,7 +40,7 @@ def list_methods(parser: Parser, of_recordings: bool = True) -> None:
         parser: The command's parser.
         of_recordings: True if methods that see several scans are listed too.
     """
-    # Listed when help is asked for: most starts need not look for what other packages bring.
+    # Listed only for the help: other commands need not look for methods of other packages.
     parser.late_epilog = partial(_listed_methods, of_recordings)
 
 

@@ -130,7 +130,7 @@ def add_topic(parser: argparse.ArgumentParser) -> None:
 
 
 def add_poses(parser: argparse.ArgumentParser) -> None:
-    """Declares where poses come from, as :func:`derain.recordings.posed.with_poses` takes it."""
+    """Declares the source of poses, for :func:`derain.recordings.posed.with_poses`."""
     parser.add_argument(
         "--poses",
         metavar="POSES",

@@ -226,7 +226,7 @@ def _campaign(options: argparse.Namespace) -> "Campaign | WorldCampaign":
 
 
 def _rain_on_scans(arguments: argparse.Namespace) -> int:
-    """Writes clean scans in the rain, and prints what it did to each."""
+    """Adds rain to clean scans, writes them, and prints the changes of each."""
     if arguments.picture:
         require("--picture", MATPLOTLIB)
         from derain.pictures.scan_pictures import before_after_figure, save

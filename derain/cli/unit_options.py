@@ -34,7 +34,7 @@ def add_units(
 
     Args:
         parser: The command's parser.
-        workers: How many processes there are by default.
+        workers: The default number of processes, as text of the help.
     """
     group = parser.add_argument_group("many scans")
     add_executor(group, f"processes, which share the threads (default: {workers})")

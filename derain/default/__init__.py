@@ -30,7 +30,7 @@ class ModelScore:
 
     Attributes:
         data: Name of the data, with a word where their rain is simulated.
-        precision: Share of rain among what it takes; None where it was not measured, or where
+        precision: Share of rain among the removed points; None if it was not measured, or where
             nothing is rain.
         recall: Share of the rain that it takes; None as before.
         iou: Intersection over union of rain, of pooled counts; None as before.
@@ -64,7 +64,7 @@ class ModelCard:
 
     Attributes:
         name: Name of the model.
-        version: Which of the models that were handed out under this name it is.
+        version: Version of the model among those of this name.
         what: A description of the model and its inputs, in a sentence.
         training: Commands that make it again, in their order.
         seed: Seed of everything that was drawn at random for it.
@@ -173,7 +173,7 @@ def default_model() -> Path:
 
 
 def default_checkpoint() -> Path:
-    """The checkpoint of the same model, which a training may go on from.
+    """The checkpoint of the same model, as a start for training.
 
     Raises:
         InputError: It is missing.

@@ -105,7 +105,7 @@ def require_writable_folder(folder: Path) -> None:
 
 
 def _target(path: Path) -> Path:
-    """The file that a path leads to, which may be written anew."""
+    """The file that a path leads to, if it may be replaced."""
     if path.exists() and not path.is_file():
         raise InputError(path, "is not a file that can be replaced", "Name a file to write.")
     return Path(os.path.realpath(path))

@@ -1,4 +1,4 @@
-"""The content of a scan file, and the one bound on what it may expand to.
+"""The content of a scan file, and the one bound on its expanded size.
 
 A small file can claim or hold far more than any scan: counts in a header, zeros that compress a
 thousandfold. Whatever a reader makes room for, it takes from the file's `MemoryBudget` first.

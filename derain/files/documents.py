@@ -86,7 +86,7 @@ class Entry:
     document and the key.
 
     Attributes:
-        source: The file, or whatever else holds the document.
+        source: The file, or other container of the document.
         key: Keys that lead to the value, joined by dots; empty for the whole document.
         value: The value.
     """
@@ -190,7 +190,7 @@ class Entry:
         members = self.members()
         for key, entry in members.items():
             if key not in parsers:
-                remedy = f"{did_you_mean(key, parsers)}Known are {', '.join(parsers)}."
+                remedy = f"{did_you_mean(key, parsers)}Available: {', '.join(parsers)}."
                 raise entry.fault("there is no such key", remedy)
         for key in required:
             if key not in members:
@@ -212,7 +212,7 @@ class Entry:
         """A list of so many finite numbers, or of any number of them.
 
         Args:
-            count: How many; None allows any number.
+            count: Length of the list; None allows any.
             read: Parser of each of them, such as ``Entry.positive``; by default ``Entry.number``.
         """
         items = self.items()
@@ -276,7 +276,7 @@ class Entry:
             if choice == self.value:
                 return choice
         raise self.fault(
-            f"{shown(self.value)} is not known", f"Known are {', '.join(map(str, choices))}."
+            f"{shown(self.value)} is not known", f"Available: {', '.join(map(str, choices))}."
         )
 
     def texts(self) -> tuple[str, ...]:

@@ -101,6 +101,6 @@ def format_of(path: Path) -> Format:
         raise InputError(
             path,
             f"'{suffix}' is not the suffix of a scan",
-            f"Known are {', '.join(FORMATS)}, and each of them with .gz.",
+            f"Available: {', '.join(FORMATS)}, and each of them with .gz.",
         )
     return FORMATS[suffix]()

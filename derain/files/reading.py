@@ -1,4 +1,4 @@
-"""Reading a file, with one error for whatever is wrong with it."""
+"""Reads a file; any fault is one InputError."""
 
 import stat
 from collections.abc import Iterator

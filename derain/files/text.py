@@ -18,7 +18,7 @@ _DECIMALS = {"f4": "%.9g", "f8": "%.17g"}
 
 
 def decode(line: bytes) -> str:
-    """Text of a header; `encode` gives back the same bytes, whatever their encoding is."""
+    """Text of a header, in any encoding; `encode` returns the same bytes."""
     return line.decode("utf-8", "surrogateescape")
 
 

@@ -89,8 +89,8 @@ def fit_rain_bounds(
         intensity: Their intensities, float32 (M,); not numbers where the scan has none.
         may_be: Points that may be rain, such as those above the ground, bool (M,).
         around: Finds neighbourhoods.
-        sparseness: How many times as far as usual the neighbours of a sparse point are.
-        reach: How many times as far as most of the sample rain may be.
+        sparseness: Distance of a sparse point's neighbours, as a multiple of the usual one.
+        reach: Largest range of rain, as a multiple of the range of most of the sample.
 
     Returns:
         The bounds; None where no intensity was measured, nothing is in the air, or what is differs

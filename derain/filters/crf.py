@@ -45,7 +45,7 @@ FEWEST_NEIGHBOURS = 4
 @FILTERS.add("crf")
 @dataclass(frozen=True)
 class CRF(PointFilter):
-    """Calls a point rain by its neighbourhood, and by what it calls the points around it.
+    """Classifies each point by its neighbourhood, and by the classes of the points around it.
 
     Only candidates may be rain: near, above the ground, and as bright as rain is. Of each of them
 

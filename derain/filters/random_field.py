@@ -27,7 +27,7 @@ def decide_sequentially(
     at distances d. A neighbour's v is ``vote`` where it is rain and -``vote`` where it is not, as
     far as its feature or an earlier decision shows; else it is its feature.
 
-    All that may be rain is taken for it first. Then what must turn is turned, wave by wave. A turn
+    All points that may be rain start as rain. Then points turn, wave by wave. A turn
     bears on later points alone, and makes none of them rain; so the waves end where a loop over
     the points in their order would. Most points are decided once, whatever their neighbours are.
 
@@ -71,7 +71,7 @@ def _turn_in_waves(
     at_least: NDArray[np.float64],
     dependents: "_Dependents",
 ) -> None:
-    """Turns what is taken for rain and is none, until nothing turns any more.
+    """Turns points from rain to not rain, until none turns any more.
 
     Args:
         is_rain: Current state of the U uncertain points, bool (U,); decided in place.
@@ -119,7 +119,7 @@ class _Dependents:
 
     Args:
         neighbours: Numbers of the neighbours of each of H hearers, int64 (k - 1, H).
-        is_earlier: Which of these are uncertain and judged before it, bool (k - 1, H).
+        is_earlier: True for those that are uncertain and judged before it, bool (k - 1, H).
         uncertain: U.
     """
 

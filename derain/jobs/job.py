@@ -50,7 +50,7 @@ class Job:
         shard: Shard | None = None,
         anew: bool = False,
     ) -> Self:
-        """Begins a job, or goes on with the one of the folder.
+        """Starts a job, or resumes the one of the folder.
 
         Args:
             folder: The folder of the results, made if missing.
@@ -173,7 +173,7 @@ class Job:
         return documents_at(self.folder, FOLDER)
 
     def _refuse_other(self, begun: "Job") -> None:
-        """Refuses to go on with a job that was begun by other options."""
+        """Refuses to resume a job that was started with other options."""
         if changed := differences(begun.options, self.options):
             raise InputError(
                 without_secrets(str(self.folder)),

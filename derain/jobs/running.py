@@ -63,7 +63,7 @@ class Work(ABC, Generic[UnitT, ResultT]):
 
     @abstractmethod
     def do(self, unit: UnitT) -> Iterator[ResultT]:
-        """Does a unit and yields its results; what it writes is complete when it ends.
+        """Does a unit and yields its results; its files are complete at the end.
 
         Raises:
             InputError: The whole unit fails.
@@ -78,11 +78,11 @@ class Work(ABC, Generic[UnitT, ResultT]):
         """A result from its record."""
 
     def look(self) -> IsThere[UnitT, ResultT]:
-        """Looks at what is written by now; of work that writes nothing, all is there."""
+        """Checks the written results; work that writes nothing is always complete."""
         return lambda unit, results: True
 
     def check(self) -> None:
-        """Refuses a process where the results would be others than where the job began.
+        """Refuses a process whose results would differ from those where the job began.
 
         Raises:
             InputError: For instance because a file has another content there.
@@ -95,7 +95,7 @@ class Value:
 
     Attributes:
         content: The result, of primitives of JSON.
-        error: Why there is none.
+        error: Reason for a missing result.
     """
 
     content: Any = None
@@ -257,7 +257,7 @@ def run(
 
 
 def completed(task: Task[UnitT, ResultT], units: Sequence[UnitT]) -> list[ResultT] | None:
-    """The results of all units of a job, whoever did them; None while one is to be done.
+    """The results of all units of a job, from all processes; None while one is missing.
 
     Args:
         task: Work for each unit.

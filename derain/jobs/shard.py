@@ -75,7 +75,7 @@ class Shard:
         A batch system that runs some tasks of an array again counts these alone.
 
         Args:
-            begun: How many shards there were, and what the first was called; None for none.
+            begun: Number of shards, and the number of the first; None for none.
         """
         if begun is None or not self.of_array:
             return self
@@ -96,7 +96,7 @@ def shard_numbers(units: Sequence[Unit], count: int) -> dict[str, int]:
 
     Args:
         units: The units.
-        count: How many shards there are.
+        count: Number of shards.
 
     Returns:
         Number of the shard, from 0, by the id of each unit.

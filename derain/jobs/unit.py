@@ -13,8 +13,8 @@ class Unit:
     Attributes:
         id: Its relative path, such as ``03/velodyne/000050``, which no other unit of the job has
             and which does not depend on the others.
-        size: Bytes of what it reads, or whatever else its time grows with.
-        inputs: Fingerprint of what it reads, by sizes and times of change.
+        size: Bytes of its inputs, or another measure that its time grows with.
+        inputs: Fingerprint of its inputs, by sizes and times of change.
     """
 
     id: str
@@ -28,7 +28,7 @@ class Record:
 
     Attributes:
         unit: Id of the unit.
-        inputs: Fingerprint of what it read.
+        inputs: Fingerprint of its inputs.
         options: Fingerprint of the options of its job.
         worker: Host and number of the process.
         ended: Its end, in ISO 8601, by the clock of its worker.

@@ -42,7 +42,7 @@ class Sample:
     ) -> "Sample":
         """Gives a view its target, by the labels of its scan if there are any.
 
-        Cells of points of which it is not known whether they are rain are not judged.
+        Cells of points of unknown class are not judged.
         """
         if scan.label is None:
             return cls(scan, view, None, measured, key)

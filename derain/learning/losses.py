@@ -108,7 +108,7 @@ def _jaccard_steps(foreground: Tensor, dtype: torch.dtype) -> Tensor:
     subtracting neighbouring losses would cancel all but a few digits in a scan of 400,000 points.
 
     Args:
-        foreground: Which points are of the class, those with the largest error first, bool
+        foreground: True for points of the class, those with the largest error first, bool
             (N, ...), for one class or for several.
         dtype: Floating-point type of the result.
 

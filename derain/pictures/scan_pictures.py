@@ -194,7 +194,7 @@ def explain_colours(figure: Figure, colours: Mapping[str, str] = OUTCOMES) -> No
 
     Args:
         figure: The figure.
-        colours: Colours by what they mean.
+        colours: Colours by their meaning.
     """
     legend_below(figure, [Patch(color=colour, label=name) for name, colour in colours.items()])
 
@@ -270,8 +270,8 @@ def scatter(
 
     Args:
         axes: The axes to draw in.
-        x: Where the points lie along the axis to the right, (N,).
-        y: Where they lie along the axis upwards, (N,).
+        x: Positions of the points along the axis to the right, (N,).
+        y: Positions along the axis upwards, (N,).
         colours: RGBA, float64 (K, 4).
         number: Number of each point's colour, int64 (N,).
     """

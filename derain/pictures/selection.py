@@ -227,7 +227,7 @@ class Labels:
             scan: The scan read from it.
 
         Raises:
-            InputError: Labels that are damaged, or that the data card does not know.
+            InputError: Labels that are damaged, or that are not on the data card.
         """
         if not frame.has_labels:
             return None

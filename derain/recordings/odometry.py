@@ -36,7 +36,7 @@ WELL_ENOUGH = 0.08
 
 # Share of surfaces that must face every direction. A flat road has 0 of them along itself; the
 # scans above, and simulated streets (spinning_64 and mems_64, 0 to 200 mm/h), have .02 or more. Of
-# 10,000 surfaces a two-hundredth still is 50, of 5 cm noise each, which know the motion to 1 cm.
+# 10,000 surfaces a two-hundredth still is 50, of 5 cm noise each, which give the motion to 1 cm.
 LEAST_FACING = 0.005
 
 # What no vehicle does between two scans, where they are taken five times a second or more often:
@@ -81,7 +81,7 @@ class Registration:
 
     @property
     def turn(self) -> float:
-        """By how much it turned, degrees, whatever about."""
+        """Angle of the turn, degrees, about any axis."""
         return turn_of(self.motion)
 
     def issues(self) -> Iterator[ScanIssue]:
@@ -185,7 +185,7 @@ def _is_small(change: NDArray[np.float64]) -> bool:
 class Odometry:
     """Finds how a sensor moved, from one scan to the next, by GICP of the two.
 
-    Each search starts from the last motion, which goes on for a moment whatever the driver does.
+    Each search starts from the last motion, which persists for a moment in any manoeuvre.
     Where that fails, and for the first two scans, it starts over with partners farther apart.
 
     Example:
@@ -241,7 +241,7 @@ class Odometry:
         return self._moved(fit.motion, fit, reason)
 
     def _fit(self, surfaces: Surfaces, before: Surfaces) -> Fit:
-        """Lays a scan upon the one before: as the motion goes on, or else starting over."""
+        """Registers a scan to the one before, starting from the last motion or else from none."""
         if self._expected is not None:
             fit = surfaces.onto(before, self._expected, WITHIN)
             if not self._trust.misfit(fit):

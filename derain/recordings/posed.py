@@ -135,7 +135,7 @@ def _with_file_poses(source: Sequence[Frame], path: Path) -> Frames:
 
 
 def _scan_of(frame: Frame) -> Scan | None:
-    """The scan of a frame; None where it cannot be read, an error of whatever needs it later."""
+    """The scan of a frame; None if it cannot be read, which is an error where it is needed."""
     try:
         return frame.read()
     except InputError:

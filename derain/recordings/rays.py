@@ -54,7 +54,7 @@ class Rays:
     """The rays of a scan, by their directions.
 
     Args:
-        xyz: Where they end, float (M, 3), metres, in the sensor's frame.
+        xyz: Ends of the rays, float (M, 3), metres, in the sensor's frame.
         threads: Threads of every search.
         rows: Rows of the scan that they are of, int64 (M,); by default 0 to M - 1.
     """

@@ -273,7 +273,7 @@ class Campaign(SplitSequences):
 def partition(sequences: int) -> tuple[int, int, int]:
     """Divides a number of sequences into those to train on, to validate and to test on.
 
-    Of one or two sequences none is held out: whoever makes so few wants to look at them.
+    Of one or two sequences none is held out: so few are only made to look at them.
     """
     held_out = max(1, round(HELD_OUT * sequences)) if sequences >= 3 else 0
     return sequences - 2 * held_out, held_out, held_out

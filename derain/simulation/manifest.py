@@ -76,7 +76,7 @@ def parameters_of(manifest: Mapping[str, Any], within: str = "") -> dict[str, An
 
     Args:
         manifest: Content of a manifest.
-        within: Path of what it is part of, with a dot at its end.
+        within: Path of its parent, with a dot at its end.
     """
     found: dict[str, Any] = {}
     for name, value in manifest.items():

@@ -64,9 +64,9 @@ class Radar:
         range_cell: Depth of a cell, metres.
         minimum_range: Begin of the first cell, metres.
         maximum_range: Farther surfaces are not seen, metres.
-        reach: Where the receiver's noise is as strong as the echo of 1 m², metres; it grows with
+        reach: Range at which the receiver's noise equals the echo of 1 m², metres; it grows with
             the fourth power of distance, as echoes get weaker.
-        leakage: What the transmitter leaks into every cell, as a radar cross-section, dBsm.
+        leakage: Leakage of the transmitter into every cell, as a radar cross-section, dBsm.
         false_alarm_rate: Probability that a cell of noise alone is a detection.
         accuracy: Standard deviation of a measured position, as a share of the cell.
         doppler_noise: Standard deviation of a measured speed, m/s.
@@ -220,7 +220,7 @@ def rain_echoes(rain: RainField, farthest: Floats, radar: Radar) -> Floats:
 
     Args:
         rain: The rain.
-        farthest: Where it ends in each direction, float64 (rows, columns), metres.
+        farthest: Largest range in each direction, float64 (rows, columns), metres.
         radar: The radar.
 
     Returns:

@@ -28,7 +28,7 @@ from derain.simulation.street import Street, lay_out_street
 from derain.simulation.track import Track
 from derain.simulation.traffic import Course, MovingThing, draw_traffic
 
-# Optical depth at which a black object cannot be told from the horizon: −ln 0.02.
+# Optical depth at which a black object cannot be distinguished from the horizon: −ln 0.02.
 # Source: Koschmieder 1924, with his contrast threshold of 2 %.
 VISIBLE_OPTICAL_DEPTH = 3.912
 

@@ -46,7 +46,7 @@ def weights_of(*names: str) -> Parser:
 
 @dataclass(frozen=True)
 class Settings:
-    """The base of frozen settings, of which a document states those that differ.
+    """The base of frozen settings; a document states those that differ from the defaults.
 
     Attributes:
         SUBJECT: Name of the settings in messages.

@@ -128,7 +128,7 @@ def draw_traffic(
 
     Args:
         count: Their number.
-        street: Where.
+        street: The street.
         speed: Of the sensor, m/s.
         times: Times of the scans, float64 (T,), seconds from 0 on.
         generator: Random generator.

@@ -56,7 +56,7 @@ class World(Settings):
         precipitation: Ranges of precipitation.
 
     Raises:
-        InputError: Weights of which none is above 0, or a share outside 0 to 1.
+        InputError: No weight above 0, or a share outside 0 to 1.
     """
 
     SUBJECT = "world"

@@ -175,7 +175,7 @@ class Destination:
 
     @contextmanager
     def opened(self, source: Source) -> Iterator[tuple[CleanSink, dict[str, str]]]:
-        """Lends a sink; what it writes is at its place when the block has ended well.
+        """Lends a sink; its files are in their place after the block ends without an error.
 
         Args:
             source: The scans.

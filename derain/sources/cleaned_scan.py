@@ -33,7 +33,7 @@ class CleanedScan:
         valid: Number of points that can be judged.
         rain: Number of removed points.
         share_removed: Share of ``rain`` in ``valid``.
-        not_known: Number of valid points of which the method is not sure; None for a method that
+        not_known: Number of valid points that the method is not sure of; None for a method that
             does not report doubt.
         milliseconds: Time of each stage.
         warnings: Warnings about the scan.

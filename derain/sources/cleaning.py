@@ -110,7 +110,7 @@ def clean(
         weather: Options for measuring the weather.
         observer: Follows the cleaning.
         division: Division of the scans into units. Where there are more scans than a block has,
-            a record of each unit is kept in the folder, by which a run that was stopped goes on.
+            a record of each unit is kept in the folder, from which a run that was stopped resumes.
             None keeps no records, unless there is an executor, or a source or a sink in an object
             store.
         executor: Does the units: an executor of :mod:`concurrent.futures` or the like, whose

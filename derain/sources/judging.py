@@ -23,12 +23,12 @@ AnswerOrError = tuple[Frame, Judgement | InputError, Stopwatch]
 
 
 def unguarded(frame: Frame) -> AbstractContextManager[None]:
-    """Lets whatever is wrong with a frame end the whole work."""
+    """Lets any error of a frame end the whole work."""
     return nullcontext()
 
 
 class Failures:
-    """Holds back what is wrong with single frames, so that the others go on.
+    """Collects the errors of single frames, so that the others go on.
 
     Args:
         report: Called with each error.

@@ -25,7 +25,7 @@ EXAMINE_EVERY = 100
 
 
 class Method(ABC):
-    """Says which points of a recording are rain: a model, a filter, or what sees several scans.
+    """Finds the points of rain in a recording: a model, a filter, or a method of several scans.
 
     Frames go in by :meth:`push`, one after the other. A method that sees one scan at a time answers
     at once; one that needs scans after the one that it judges answers when they are there, and for
@@ -145,7 +145,7 @@ class Method(ABC):
         return None
 
     def fingerprint(self) -> str:
-        """A fingerprint of what it calls rain: of its parameters, and of its weights if it has any.
+        """A fingerprint of its answers: of its parameters, and of its weights if it has any.
 
         It is 16 hexadecimal digits.
         """

@@ -18,7 +18,7 @@ def read_numbers(path: Path, *columns: int) -> NDArray[np.float64]:
 
     Args:
         path: The file.
-        columns: How many numbers a line may have; the first line decides which of them.
+        columns: Permitted numbers of values in a line; the first line selects one.
 
     Returns:
         float64 (T, columns); of a file without lines, as many as are named last.

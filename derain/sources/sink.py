@@ -154,7 +154,7 @@ class LabelSink(FolderSink):
 
 
 def _is_same(one: Path, other: Path) -> bool:
-    """True if two paths are of one file or folder, whatever they are written like."""
+    """True if two paths lead to one file or folder."""
     return _real(one) == _real(other)
 
 

@@ -79,7 +79,7 @@ class Trajectory:
 
         Args:
             time: Seconds.
-            scan: What was taken then, for messages.
+            scan: Name of the scan of that time, for messages.
 
         Returns:
             Sensor to world, float64 (4, 4), metres.

@@ -43,7 +43,7 @@ class Division:
         block: Scans of a block of a long recording.
         shard: The shard of the units that is done; None for all.
         keep_records: True if records are kept even of fewer scans than a block has.
-        anew: True if everything is done again, whatever the records of the folder are of.
+        anew: True if everything is done again, even if the records are of other options.
     """
 
     block: int = BLOCK
@@ -64,7 +64,7 @@ class Division:
     def begin(
         self, folder: Place, options: Mapping[str, Any], units: "list[FrameUnit]"
     ) -> "tuple[Job, list[FrameUnit]]":
-        """Begins a job, or goes on with the one of the folder.
+        """Starts a job, or resumes the one of the folder.
 
         Args:
             folder: The folder of the results.

@@ -78,7 +78,7 @@ class FileDocuments:
                 os.replace(written, path)
 
     def remove_all(self) -> None:
-        """Removes the folder, at once for whoever reads it."""
+        """Removes the folder, at once for its readers."""
         if not self._folder.exists():
             return
         with writing(self._folder), temporary_folder(self._folder.parent) as temporary:

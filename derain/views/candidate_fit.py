@@ -13,7 +13,7 @@ from derain.views.candidates import Bound, Candidates, bounded_channels
 from derain.views.channels import channel_values
 from derain.views.morton import first_rows
 
-# Share of the rain that candidates hold, unless another is asked for.
+# Default share of the rain that candidates hold.
 RAIN_INSIDE = 0.999
 LEAST_INSIDE = 0.5
 
@@ -35,7 +35,7 @@ def fit_candidates(
     """Finds bounds that hold a stated share of the rain with a margin, and leave out what they can.
 
     Each side of each channel is allowed an equal part of the rain that may be left out, and the
-    bound found so is moved outwards by a margin that the rain's own tail says: as far again as
+    bound found so is moved outwards by a margin from the rain's own tail: as far again as
     from ten times that part to the part itself. Of a tail that falls exponentially, a tenth of the
     part is left out then, in scans alike. Where the part is less than one point of the rain, the
     bound starts from the outermost one, and the tail behind the ten outermost is followed further

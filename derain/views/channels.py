@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from derain.scan import Scan
 
-# What networks see unless they are told otherwise. All other channels are extra: a scan need not
-# have them, and a data card has their statistics only where a network has asked for them.
+# The default channels of networks. All other channels are extra: a scan need not have them, and a
+# data card has their statistics only after a network has used them.
 USUAL_CHANNELS = ("x", "y", "z", "intensity", "range")
 
 # Far more than any sensor measures of a point.

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 # one ray stand out, which is where neighbouring rays are out of reach.
 TOLERANCES = (0.05, 0.02, 0.01, 0.005, 0.002, 0.001)
 
-# More returns in one direction are not of one ray: sensors tell up to three apart.
+# More returns in one direction are not of one ray: sensors distinguish up to three.
 MOST_RETURNS = 3
 
 # Directions agree by chance in the nearer half of a tolerance at most as often as in the farther.
@@ -35,7 +35,7 @@ def directions(xyz: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[n
         count as positive: straight behind is 180, and above and below the sensor, where every
         azimuth would do, it is 0.
     """
-    # Adding 0 makes zeros positive: arctan2 tells -0.0 from 0.0.
+    # Adding 0 makes zeros positive: arctan2 distinguishes -0.0 from 0.0.
     x, y, z = np.ascontiguousarray(xyz.T, dtype=np.float64) + 0.0
     azimuth = np.degrees(np.arctan2(y, x))
     inclination = np.degrees(np.arctan2(z, np.sqrt(x * x + y * y)))

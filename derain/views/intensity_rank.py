@@ -13,7 +13,7 @@ def intensity_rank(scan: Scan) -> NDArray[np.int64]:
     """Ranks of the points of a scan by their intensity.
 
     Every intensity that occurs counts by the root of how often it does: where most of the points
-    share one, such as 0, the others are still told apart.
+    share one, such as 0, the others still differ.
 
     Args:
         scan: The scan.

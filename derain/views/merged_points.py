@@ -1,8 +1,8 @@
 """Points that are one return, written more than once: on one ray, as good as equally far.
 
 Sensors with two returns, deskewed scans and merged files write most points nearly twice, fractions
-of a millimetre to centimetres apart. Such copies say nothing about a neighbourhood, as those at
-exactly one position say nothing.
+of a millimetre to centimetres apart. Such copies hold no information about a neighbourhood, as
+those at exactly one position hold none.
 """
 
 import numpy as np

@@ -17,7 +17,7 @@ from derain.views.neighbour_search import NeighbourSearch
 from derain.views.spherical_grid import ALL_AROUND
 from derain.views.view import VIEWS, BackProjection, View, ViewedScan
 
-# The most that the Spec of a network may ask for, seven times as many as 3D-OutDet looks at. A
+# The most neighbours that a Spec may state, seven times as many as those of 3D-OutDet. A
 # hundred thousand points have 80 MB of them.
 MOST_NETWORK_NEIGHBOURS = 64
 

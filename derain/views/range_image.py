@@ -92,7 +92,7 @@ class RangeImage(ViewedScan):
         """Back-projection of pixel scores to points, by ``back_projection_name``.
 
         Rows off the grid, and rows that are no candidates, have 0; a pixel that shows what is no
-        candidate counts as scored 0, whatever the network says of it.
+        candidate counts as scored 0, for any score of the network.
         """
         if self.candidate is None:
             rows, asked = np.flatnonzero(self.judged), None
@@ -164,7 +164,7 @@ class RangeView(View):
             raise InputError(
                 "back_projection",
                 f"no such back-projection: '{self.back_projection}'",
-                f"Known are {', '.join(BACK_PROJECTIONS)}.",
+                f"Available: {', '.join(BACK_PROJECTIONS)}.",
             )
 
     @classmethod
@@ -173,7 +173,7 @@ class RangeView(View):
     ) -> Self:
         """The view that a Spec describes by its ``kind``, ``grid`` and ``way_back``.
 
-        It takes one thread, whatever it may use.
+        It uses one thread, even if more are permitted.
 
         Raises:
             InputError: Something that does not describe it.

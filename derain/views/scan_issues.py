@@ -13,7 +13,7 @@ from derain.views.full_scale import FULL_SCALES
 # Intensities this many times off the training data's are of another unit.
 INTENSITY_MISMATCH = 30.0
 
-# Full scale of intensities, by the units that tell it.
+# Full scale of intensities, by the units that determine it.
 SCALE_OF_UNIT = {f"0..{scale:g}": scale for scale in FULL_SCALES}
 
 # What of a scan its full scale is read from: above it lie glints, and damaged values.
@@ -55,7 +55,7 @@ class ScanChecker(Protocol):
 
 
 def missing_channels(scan: Scan, fill_value: Mapping[str, float], data: str) -> Iterator[ScanIssue]:
-    """Says which channels of a model a scan has not got.
+    """Yields an issue for each channel of a model that a scan lacks.
 
     Args:
         scan: The scan.

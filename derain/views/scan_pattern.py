@@ -21,7 +21,7 @@ REAL_GAP = 30.0
 # Returns nearer to each other than this are of one beam or one shot, degrees: no sensor is finer.
 FINEST_STEP = 0.01
 
-# What a step is taken for where too few returns tell, degrees; usual of spinning sensors.
+# The step if there are too few returns to measure it, degrees; usual for spinning sensors.
 USUAL_STEP = 0.2
 
 # Clusters of inclination are beams if they take up at most this share of the field of view (beams

@@ -233,7 +233,7 @@ def grid_at(entry: Entry) -> SphericalGrid:
     if entry.value not in PUBLISHED_GRIDS:
         raise entry.fault(
             f"there is no grid named {shown(entry.value)}",
-            f"Known are {', '.join(PUBLISHED_GRIDS)}; or describe one by columns, rows and "
+            f"Available: {', '.join(PUBLISHED_GRIDS)}; or describe one by columns, rows and "
             "inclination.",
         )
     return _described(Entry(entry.source, entry.key, PUBLISHED_GRIDS[entry.value]))

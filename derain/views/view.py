@@ -132,8 +132,8 @@ class View(ABC):
     def with_candidates(self, candidates: Candidates) -> "View":
         """The same view with cells for candidates alone; all other points are given score 0.
 
-        What the network says of a candidate must not change by it: whatever its score depends on
-        is seen as before. A view that cannot tell them apart refuses, as this one does.
+        The network's score of a candidate must not change: all inputs that it depends on stay in
+        the view. A view without candidates refuses, as this one does.
 
         Args:
             candidates: Points that may be rain.

@@ -20,7 +20,7 @@ class Window:
 
     Attributes:
         before: Scans before it in its sequence.
-        after: Scans after it, for which whoever judges it has to wait.
+        after: Scans after it, for which the answer has to wait.
 
     Raises:
         InputError: Numbers below 0.
@@ -70,7 +70,7 @@ class PlacedScan:
 class WindowOfScans:
     """A scan that is to be judged, and those around it in its sequence.
 
-    Near the ends of a sequence there are fewer than the view's :class:`Window` asks for.
+    Near the ends of a sequence there are fewer than in the view's :class:`Window`.
 
     Attributes:
         judged: The scan that is to be judged.

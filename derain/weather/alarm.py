@@ -80,7 +80,7 @@ class Latch:
         """Takes the visibility of the next scan.
 
         A scan whose interval lies on both sides of the threshold changes nothing, and neither does
-        one of which nothing is known: the count goes on with the scan after it.
+        a scan without a value: the count continues with the scan after it.
         """
         least, most = visibility.at_least, visibility.at_most
         if self.on:
@@ -164,7 +164,7 @@ class Alarm:
         return self.level
 
     def level_of(self, visibility: Visibility, reach: Visibility = NOT_KNOWN) -> Level | None:
-        """The level of one scan by itself, whatever came before it.
+        """The level of one scan by itself, without those before it.
 
         Returns:
             The worst level that its whole interval lies below; None where there is none and the

@@ -120,11 +120,11 @@ class ScanWeather:
 
     @cached_property
     def reach(self) -> Visibility:
-        """The range within which 99 % of the rays end, whatever they end at."""
+        """The range within which 99 % of the rays end, at rain or anything else."""
         return self.range_of(SHARE_REACHED)
 
     def range_of(self, share: float) -> Visibility:
-        """The range within which a share of the rays end, whatever they end at.
+        """The range within which a share of the rays end, at rain or anything else.
 
         Args:
             share: Of the rays, such as 0.95.

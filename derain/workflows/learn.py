@@ -166,7 +166,7 @@ def _clear(work: Path) -> None:
 
 
 def _warning_guard() -> Guard:
-    """Turns what is wrong with one scan into a warning; the others go on."""
+    """Turns the error of one scan into a warning; the others go on."""
     return Failures(lambda error: warn(str(error))).skipping_failures
 
 
@@ -220,7 +220,7 @@ def _refuse_clean(results: LearnResults) -> None:
     """Refuses to train on a recording in which the teacher has found nothing to learn.
 
     Raises:
-        InputError: No point of which it is sure, or hardly any rain among them.
+        InputError: No sure point, or hardly any rain among the sure points.
     """
     taught = results.taught
     if taught.shares[2] == 1 or not taught.points:

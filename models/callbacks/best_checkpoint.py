@@ -1,4 +1,4 @@
-"""The best checkpoint of a training run, which a run that goes on takes along."""
+"""The best checkpoint of a training run, which a resumed run takes along."""
 
 import os
 import re
@@ -22,7 +22,7 @@ from derain.system.notices import warn
 
 
 class BestCheckpoint(ModelCheckpoint):
-    """Keeps the best epochs, also of a run that goes on in a folder of its own.
+    """Keeps the best epochs, also of a run resumed in a folder of its own.
 
     Lightning forgets what was best when the folder changes, and calls the first epoch there the
     best, however poor. This one goes on with the scores and with copies of the files; those of the

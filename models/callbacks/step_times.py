@@ -29,7 +29,7 @@ class StepTimes(lightning.Callback):
     _spent: dict[str, float]  # milliseconds of the steps since the last log
 
     def on_train_start(self, *_: Any) -> None:
-        """Starts again."""
+        """Resets the timing."""
         self._begin()
         self._started = False
 

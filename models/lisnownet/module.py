@@ -125,7 +125,7 @@ class LiSnowNet(DerainingModule, Published):
                 "Give an alpha of at least 0 and a beta from 0 to 1.",
             )
         if norm not in RESIDUALS:
-            raise InputError(self.NAME, f"no such norm: '{norm}'", "Known are l1 and l2.")
+            raise InputError(self.NAME, f"no such norm: '{norm}'", "Available: l1 and l2.")
         self.save_hyperparameters()
         self.network = LiSnowNetwork(width=width, dropout=dropout)
         self.selection = SelectionRule.fitted(rule, [])

@@ -120,7 +120,7 @@ class SelectionRule:
         """
         names = [field.name for field in fields(cls)]
         if unknown := sorted(set(stated) - set(names)):
-            raise InputError("rule", f"{unknown} are no constants of it", f"Known are {names}.")
+            raise InputError("rule", f"{unknown} are no constants of it", f"Available: {names}.")
         measured = {"full_scale": full_scale(scans), "ground": _road(scans) + ABOVE_ROAD}
         known = {name: value for name, value in measured.items() if np.isfinite(value)}
         return cls(**{**known, **stated})

@@ -1,4 +1,4 @@
-"""3D-OutDet made relative: it sees nothing that differs between sensors.
+"""3D-OutDet with relative inputs, none of which differs between sensors.
 
 3D-OutDet is given places and intensities, by which it knows the sensor that it was trained on, and
 on another one it finds nothing. This variant of our own is given where neighbours are, in steps of

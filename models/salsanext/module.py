@@ -74,7 +74,7 @@ class SalsaNextModule(SupervisedModule):
         warm_up: Epochs in which the learning rate rises from 0.
         decay: Factor by which it falls per epoch after that, a little at every step.
         published_loss: Train as published: empty pixels count as background, and the Lovász loss
-            sees rain pixels only, so that it knows no false positive.
+            sees rain pixels only, so that it has no false positives.
         threshold: A point is rain where its probability is greater.
         candidates: Share of the training scans' rain that must lie within a few bounds (range,
             height, intensity), outside which nothing is learnt from or called rain; None for none.

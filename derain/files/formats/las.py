@@ -146,7 +146,7 @@ def _panics_as_errors() -> Iterator[None]:
 def _with_dimensions(
     laspy: ModuleType, path: Path, header: Any, columns: Mapping[str, NDArray[Any]]
 ) -> Any:
-    """The header with a place for further columns; itself where there are none."""
+    """The header with room for further columns; itself if there are none."""
     if not columns:
         return header
     header = deepcopy(header)
@@ -215,7 +215,7 @@ def _check_counts(content: Content) -> None:
 
 
 def _check_chunks(content: Content, record: bytes, size: int, begin: int) -> None:
-    """Refuses a LAZ file whose chunks do not lie in it, for laspy allocates whatever they state.
+    """Refuses a LAZ file whose chunks exceed it, because laspy allocates the size that they state.
 
     Args:
         content: The file.

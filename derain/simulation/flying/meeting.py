@@ -1,4 +1,4 @@
-"""Beams on their way through all that flies: what they meet, and what the sensor reports."""
+"""Beams among flying particles: the particles that they meet, and the sensor's reports."""
 
 from dataclasses import dataclass, replace
 from typing import Self

@@ -45,9 +45,9 @@ class Precipitation(Settings):
             ``number`` gives more, there are fewer.
         jitter: Standard deviation of the distance of a particle at the detection threshold, metres;
             it falls with the root of the power, and adds to the sensor's own noise.
-        gust_form: How the density varies in space.
+        gust_form: Form of the density's variation in space.
         gust_length: Over which length it does, metres.
-        gust_contrast: How sharply it does.
+        gust_contrast: Strength of that variation.
         gust_seed: Directions of its waves.
         drift: Particles that drift at the ground over those that fall.
         drift_height: Height over which their density falls to 1/e, metres.
@@ -57,7 +57,7 @@ class Precipitation(Settings):
         haze: Share of the beams in which the air or water on the sensor returns something.
         haze_depth: Mean distance of those returns beyond the minimum range, metres.
         haze_strength: Their greatest power over the detection threshold.
-        haze_patches: How sharply they gather in parts of the view; 0 is everywhere alike.
+        haze_patches: Strength of their concentration in parts of the view; 0 is uniform.
 
     Raises:
         InputError: A value that no precipitation can have.
@@ -128,7 +128,7 @@ class Kind(Settings):
     modelling choices around the sources that kinds.yaml names; none of them was chosen by a label.
 
     Attributes:
-        weight: How often it is drawn, over the weights of the other kinds; 0 is never.
+        weight: Relative frequency of its draws among the kinds; 0 is never.
         number: m⁻³.
         diameter: Millimetres.
         shape: Of the gamma distribution.

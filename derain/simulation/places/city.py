@@ -20,7 +20,7 @@ class Section:
     """The section across a street, metres to the left of the sensor.
 
     Attributes:
-        kerbs: Where the roadway ends, on the right and on the left; parked cars included.
+        kerbs: Edges of the roadway, on the right and on the left; parked cars included.
         fronts: Begin of the houses.
     """
 

@@ -70,7 +70,7 @@ def scatter(
 
     Args:
         makes: Function that makes each of them; those without a place are left out.
-        places: Where, metres.
+        places: Their places, metres.
         generator: Random generator.
     """
     for make, (x, y) in zip(makes, places, strict=False):
@@ -99,7 +99,7 @@ def line_up(
 
     Args:
         make: Makes a piece along x from the origin on, by its length in metres.
-        line: Where; a number is the line along x at that y, metres.
+        line: The line; a number is the line along x at that y, metres.
         x: From where to where, metres.
         piece: Length of a piece, metres.
         generator: Random generator.

@@ -1,4 +1,4 @@
-"""Walls: of houses, with windows and what hangs on them, and those that close a room."""
+"""Walls: of houses, with windows and fixtures, and of rooms."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
