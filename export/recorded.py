@@ -41,8 +41,8 @@ PlacedJudgement = tuple[Judgement, NDArray[np.float64]]
 
 UNLIKE = ScanIssue(
     "unlike the scans around it",
-    "the scans around it do not show the same from where it was taken: its pose is wrong, or it is "
-    "there twice; it is judged by itself",
+    "the scans around it do not match it at its pose: the pose is wrong, or the scan is there "
+    "twice; it is judged by itself",
 )
 
 # Of at most so many points that the model takes for solid, more rays of another scan have to end at

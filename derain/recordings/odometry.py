@@ -85,10 +85,10 @@ class Registration:
         return turn_of(self.motion)
 
     def issues(self) -> Iterator[ScanIssue]:
-        """Says so where it is not to be trusted."""
+        """Yields an issue if it is not to be trusted."""
         if not self.trusted:
             detail = f"its pose is not known: {self.reason}"
-            yield ScanIssue("its place is not known", detail)
+            yield ScanIssue("its pose is not known", detail)
 
 
 def shift_of(motion: NDArray[np.float64]) -> float:
@@ -120,27 +120,27 @@ class Trust:
         self._motions: list[NDArray[np.float64]] = []  # the last trusted one, and the last one
 
     def misfit(self, fit: Fit) -> str:
-        """Why two scans do not lie upon one another; empty where they do.
+        """Reason why two scans cannot be registered; empty if they can.
 
         Args:
             fit: The fit.
         """
         if fit.matched < LEAST_MATCHED:
             return (
-                f"only {fit.matched:.0%} of its surfaces are where the scan before has some: it is "
-                "of another place, or too far on"
+                f"only {fit.matched:.0%} of its surfaces match those of the scan before: it shows "
+                "another place, or is too far away"
             )
         if fit.residual > (most := self._most_apart()):
             return (
-                f"its surfaces lie {fit.residual:.3f} m from those of the scan before, where "
-                f"{most:.3f} m is the most"
+                f"its surfaces lie {fit.residual:.3f} m from those of the scan before, more than "
+                f"the limit of {most:.3f} m"
             )
         if fit.facing < LEAST_FACING:
             return "too few surfaces face some direction to measure the motion along it"
         return "" if fit.converged else "the search for the motion did not converge"
 
     def unlikely(self, motion: NDArray[np.float64]) -> str:
-        """Why no vehicle moves so between two scans; empty where one may.
+        """Reason why no vehicle moves in this way between two scans; empty if one can.
 
         Args:
             motion: Takes a scan's frame to that of the scan before, float64 (4, 4), metres.
@@ -155,12 +155,12 @@ class Trust:
             return ""
         least = min(changes, key=shift_of)
         return (
-            f"{shift_of(motion):.1f} m from the scan before, {shift_of(least):.1f} m off what the "
-            "motion so far leads to: the scans are out of order or far apart"
+            f"{shift_of(motion):.1f} m from the scan before, {shift_of(least):.1f} m off the "
+            "prediction from the motion so far: the scans are out of order or far apart"
         )
 
     def remember(self, fit: Fit, trusted: bool) -> None:
-        """Takes a registration that fits into what is usual.
+        """Adds a registration that fits to the statistics.
 
         Args:
             fit: The fit of the two scans.

@@ -59,19 +59,19 @@ def missing_channels(scan: Scan, fill_value: Mapping[str, float], data: str) -> 
 
     Args:
         scan: The scan.
-        fill_value: The channels that it has not got, and the means that stand in for them.
+        fill_value: The channels that it lacks, and the means that replace them.
         data: Name of the data that the means are of.
     """
     if not scan.valid.any():
         return
     for name, mean in fill_value.items():
         lack, detail = _lack(scan) if name == "intensity" else (f"no {name}", f"no {name}")
-        yield ScanIssue(lack, f"{detail}: the mean of {data}, {mean:.3g}, stands in")
+        yield ScanIssue(lack, f"{detail}: replaced by the mean of {data}, {mean:.3g}")
 
 
 def missing_intensity(
     scan: Scan,
-    consequence: str = "nothing can be found without; name its column, or take default or dror",
+    consequence: str = "nothing can be found without it; name its column, or use default or dror",
 ) -> Iterator[ScanIssue]:
     """Yields an issue if a scan lacks the intensity that a method needs.
 
@@ -188,7 +188,7 @@ def _lack(scan: Scan) -> tuple[str, str]:
     if values.min() == values.max():
         alike = f"intensity {values[0]:g} at every point, so that it was not measured"
         return "intensity not measured", alike
-    return "intensity not measured", "no intensity is a number that sensors measure"
+    return "intensity not measured", "no intensity is a possible value of a sensor"
 
 
 def _other_unit(smaller: bool) -> str:

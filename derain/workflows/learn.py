@@ -65,7 +65,7 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
         scans = "1 scan" if len(source) == 1 else f"{len(source)} scans"
         raise InputError(
             config.recordings[0],
-            f"{scans}: too few to learn from some and choose by others",
+            f"{scans}: too few for training and validation",
             f"Record {FEWEST_SCANS} or more, one after the other; twenty are enough.",
         )
     student = student_of(config, source)

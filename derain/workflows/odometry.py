@@ -174,9 +174,9 @@ def _write(found: FoundPoses, form: PoseFormat) -> None:
     if len(registrations) > 1 and not any(each.trusted for each in registrations[1:]):
         raise InputError(
             found.file,
-            "was not written: no two scans of the recording could be laid upon one another "
+            "was not written: no two scans of the recording could be registered to one another "
             f"({registrations[1].reason})",
-            "See that they are consecutive, in order of time, and of one sensor.",
+            "Check that they are consecutive, in order of time, and of one sensor.",
         )
     poses = np.array([each.pose for each in registrations])
     times = np.array(found.times) if form == "tum" else None
@@ -204,7 +204,7 @@ def _files_of(recordings: Sequence[Sequence[Frame]], out: Path, replace: bool) -
                 recording[0].name,
                 f"another recording is called {recording[0].sequence} too, and the poses of both "
                 f"would be {file}",
-                "Take them in two runs, each to its --out.",
+                "Process them in two runs, each to its --out.",
             )
         _refuse_to_overwrite(file, recording, replace)
         require_writable(file)
@@ -247,16 +247,16 @@ def _times(recording: Sequence[Frame], form: PoseFormat) -> list[float]:
         lacking = next(frame for frame in recording if frame.time is None)
         raise InputError(
             lacking.name,
-            "its time is not known, and a line of TUM's form begins with the time",
-            "Write a times.txt beside the scans, a line of seconds each, or take --format kitti.",
+            "its time is not known, and a line of TUM's format begins with the time",
+            "Write a times.txt beside the scans, a line of seconds each, or use --format kitti.",
         )
     # Poses are found again by their times, which have to ascend.
     for (earlier, later), frame in zip(pairwise(times), recording[1:], strict=True):
         if later <= earlier:
             raise InputError(
                 frame.name,
-                f"was taken at {later:.3f} s, the scan before it at {earlier:.3f} s, and lines of "
-                "TUM's form go by ascending time",
-                "Name the scans in the order that they were taken in, or take --format kitti.",
+                f"was taken at {later:.3f} s, the scan before it at {earlier:.3f} s, and TUM's "
+                "format requires ascending times",
+                "Name the scans in the order that they were taken in, or use --format kitti.",
             )
     return times

@@ -18,8 +18,8 @@ from derain.export.timing import STAGES
 from derain.files.atomic import replacing
 
 SIMULATED_IS_EASY = (
-    "**Simulated data.** What falls in a simulation is easier to find than what falls from the "
-    "sky: these figures are no evidence of quality on real scans."
+    "**Simulated data.** Simulated rain is easier to find than real rain: these figures are no "
+    "evidence of quality on real scans."
 )
 
 READING = """\
@@ -28,19 +28,19 @@ READING = """\
 - `-` is a score that is undefined: precision where no point was called rain, recall where none is
   rain, F1 and IoU where neither holds. A mean over scans is over the scans that have the score.
 - `IoU 95 %` is the bootstrap interval over scans, `behind best` that of the difference to the best
-  IoU, on the same draws: one that reaches 0 does not separate the two on these scans. Consecutive
-  scans are alike, which makes both too narrow.
+  IoU, on the same draws: an interval that reaches 0 shows no significant difference on these
+  scans. Consecutive scans are alike, which makes both too narrow.
 - ms are from file to mask, median and 95th percentile, each method alone in a process of its own
   and no search for neighbours shared. MiB is that process's largest resident memory, Python and its
   libraries included.
-- `position` uses only where rain was in the training scans, `intensity` only that rain is dim and
-  near; `all` and `none` look at nothing. A method that does not beat them has learnt nothing."""
+- `position` uses only the places of rain in the training scans, `intensity` only that rain is dim
+  and near; `all` and `none` use nothing. A method that does not beat them has learnt nothing."""
 
 
 OTHER_RUNTIMES = """\
-Each model by another runtime beside itself by onnxruntime in float32, on the scans that were timed:
-the largest difference of a logit, as a share of the scan's largest where that is above 1; points or
-pixels on the other side of the threshold; what both call rain, as a share of what either does."""
+Each model on another runtime, compared with onnxruntime in float32 on the timed scans: the largest
+difference of a logit, relative to the scan's largest logit if that is above 1; points or pixels on
+the other side of the threshold; and the IoU of the rain that the two find."""
 
 
 def write_report(rows: Sequence[Row], facts: Mapping[str, Any], out: Path) -> None:

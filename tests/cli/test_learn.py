@@ -78,7 +78,7 @@ def test_a_recording_becomes_a_model_and_a_report_whatever_its_labels(
 
     report = (work / "report.md").read_text()
     student = "The student: outdet, blind to intensity, started from mine.ckpt"
-    for heading in ("What could not be learnt", "The teacher: dror", student):
+    for heading in ("Limits of the model", "The teacher: dror", student):
         assert f"## {heading}" in report
     assert "4 scans to learn from, 1 held out" in report
     for name in ("teacher", "removed", "held_out_1", "held_out_1_beside"):

@@ -52,7 +52,7 @@ def test_one_intensity_everywhere_was_not_measured(spec: Spec, value: float) -> 
     assert issue.kind == "intensity not measured"
     assert issue.detail == (
         f"intensity {value:g} at every point, so that it was not measured: "
-        "the mean of WADS, 9.88, stands in"
+        "replaced by the mean of WADS, 9.88"
     )
     for checker in (SSR(), IntensityRule(1e6, 1e6)):
         assert kinds(scan, checker) == ["intensity not measured"]
