@@ -36,7 +36,7 @@ class Submits(Protocol):
     What ``submit`` returns needs ``result()`` and ``done()``.
     """
 
-    def submit(self, work: Callable[..., Any], /, *given: Any) -> Any:
+    def submit(self, work: Callable[..., Any], /, *args: Any) -> Any:
         """Has work done, now or later, here or elsewhere."""
 
 

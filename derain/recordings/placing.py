@@ -76,10 +76,10 @@ class PlacedFrames(RecentFrames):
         except InputError as error:
             detail = f"its pose is not known, and is computed from the scans: {error}"
             doubts.append(ScanIssue(SOUGHT, detail))
-        given = pose is not None
-        if self.starts_new_recording(frame) or self._has_poses not in (None, given):
+        has_pose = pose is not None
+        if self.starts_new_recording(frame) or self._has_poses not in (None, has_pose):
             self._stretch += 1  # another world
-        self._has_poses = given
+        self._has_poses = has_pose
         if pose is None:
             registration = self._odometry.register(frame, scan)
             doubts.extend(registration.issues())

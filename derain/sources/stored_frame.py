@@ -154,8 +154,8 @@ class StoredBag(StoredFrame):
 
     def stamp(self) -> str:
         """Sizes and versions of its objects, and a fingerprint of the poses that are given."""
-        given = "" if self.trajectory is None else self.trajectory.fingerprint()
-        return f"{super().stamp()} {given}"
+        poses = "" if self.trajectory is None else self.trajectory.fingerprint()
+        return f"{super().stamp()} {poses}"
 
     def cloud(self, key: str, name: str, seconds: float | None) -> Self:
         """One of its clouds, of which only that is known.

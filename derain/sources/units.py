@@ -232,8 +232,8 @@ def _size(frame: Frame) -> int:
 
 def _stamp(frame: Frame) -> str:
     """The frame's name, and what changes when its file or its pose does."""
-    given = frame.sensor_to_world
-    pose = "" if given is None else sha256(given.tobytes()).hexdigest()
+    matrix = frame.sensor_to_world
+    pose = "" if matrix is None else sha256(matrix.tobytes()).hexdigest()
     try:
         return f"{frame.key} {frame.stamp()} {pose}"
     except InputError:

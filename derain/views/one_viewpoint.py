@@ -94,7 +94,7 @@ def viewpoint_issues(scan: Scan) -> Iterator[ScanIssue]:
     """
     rows = np.flatnonzero(scan.valid)
     if len(rows) < LEAST_VALID * len(scan) or len(rows) < FEWEST_RETURNS:
-        yield from _beyond_all_sensors(scan)
+        yield from _map_issue(scan)
         if len(rows):
             yield ScanIssue(
                 "almost empty",
@@ -103,13 +103,13 @@ def viewpoint_issues(scan: Scan) -> Iterator[ScanIssue]:
             )
         return
     sample = scan.xyz.take(rows[:: -(-len(rows) // SAMPLED)], axis=0).astype(np.float64)
-    misplaced = [*_elsewhere(sample)] or [*_in_other_units(sample)]
+    misplaced = [*_off_centre_issue(sample)] or [*_unit_issue(sample)]
     yield from misplaced
     if not misplaced:
-        yield from [*_of_one_beam(sample)] or _of_many_viewpoints(scan)
+        yield from [*_single_beam_issue(sample)] or _viewpoints_issue(scan)
 
 
-def _beyond_all_sensors(scan: Scan) -> Iterator[ScanIssue]:
+def _map_issue(scan: Scan) -> Iterator[ScanIssue]:
     """Yields an issue if most of the rows are points too far off for any unit: those of a map."""
     finite = np.isfinite(scan.xyz).all(axis=1)
     beyond = (np.abs(scan.xyz[finite]) > LARGEST_COORDINATE).any(axis=1)
@@ -121,7 +121,7 @@ def _beyond_all_sensors(scan: Scan) -> Iterator[ScanIssue]:
         )
 
 
-def _elsewhere(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
+def _off_centre_issue(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
     """Yields an issue if points, float64 (M, 3), lie together, far from the origin."""
     centre = np.median(sample, axis=0)
     around = float(np.median(np.linalg.norm(sample - centre, axis=1)))
@@ -135,7 +135,7 @@ def _elsewhere(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
         )
 
 
-def _in_other_units(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
+def _unit_issue(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
     """Yields an issue if points, float64 (M, 3), are farther off or nearer than in metres."""
     range_ = np.linalg.norm(sample, axis=1)
     far, near = np.percentile(range_, [FAR_PERCENTILE, 99])
@@ -175,7 +175,7 @@ def _height(sample: NDArray[np.float64]) -> float:
     return -float(np.percentile(below, GROUND_PERCENTILE))
 
 
-def _of_one_beam(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
+def _single_beam_issue(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
     """Yields an issue if points, float64 (M, 3), are all of one plane or cone of rays."""
     rays = sample / np.linalg.norm(sample, axis=1, keepdims=True)
     lowest, highest = np.degrees(np.arcsin(np.percentile(rays[:, 2], [1, 99]).clip(-1, 1)))
@@ -190,7 +190,7 @@ def _of_one_beam(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
         )
 
 
-def _of_many_viewpoints(scan: Scan) -> Iterator[ScanIssue]:
+def _viewpoints_issue(scan: Scan) -> Iterator[ScanIssue]:
     """Yields an issue if points are denser, or surfaces more often torn, than in one scan."""
     rays = rays_near_axes(scan)
     crowding, step = crowding_far_off(rays), range_step(rays)

@@ -73,18 +73,18 @@ def stated_returns(scan: Scan) -> StatedReturns | None:
 Columns = Mapping[str, NDArray[Any]]
 
 
-def _of_numbers(scan: Scan, columns: Columns) -> StatedReturns | None:
+def _from_numbers(scan: Scan, columns: Columns) -> StatedReturns | None:
     name = next((name for name in NUMBER_NAMES if name in columns), None)
     if name is None:
         return None
     number = _whole(columns[name])
     count = next((_whole(columns[title]) for title in COUNT_NAMES if title in columns), None)
     if count is None:
-        return _counted(scan, name, number)
-    return _of_so_many(scan, name, number, count)
+        return _from_numbers_alone(scan, name, number)
+    return _from_numbers_and_counts(scan, name, number, count)
 
 
-def _of_las_bits(scan: Scan, columns: Columns) -> StatedReturns | None:
+def _from_las_bits(scan: Scan, columns: Columns) -> StatedReturns | None:
     bits = columns.get("bit_fields")
     if bits is None or bits.dtype != np.uint8:
         return None
@@ -93,10 +93,12 @@ def _of_las_bits(scan: Scan, columns: Columns) -> StatedReturns | None:
     width = 4 if "classification_flags" in columns else 3
     ones = (1 << width) - 1
     number, count = bits & ones, bits >> width & ones
-    return _of_so_many(scan, "bit_fields", number.astype(np.int64), count.astype(np.int64))
+    return _from_numbers_and_counts(
+        scan, "bit_fields", number.astype(np.int64), count.astype(np.int64)
+    )
 
 
-def _of_so_many(
+def _from_numbers_and_counts(
     scan: Scan, name: str, number: NDArray[np.int64], count: NDArray[np.int64]
 ) -> StatedReturns | None:
     """Returns by numbers from 1, if the number of returns of each ray is known."""
@@ -108,11 +110,11 @@ def _of_so_many(
         np.where(several, number, -1),
         several & (number < count),
         several & (number > 1),
-        _nowhere(scan),
+        _no_range(scan),
     )
 
 
-def _of_types(scan: Scan, columns: Columns) -> StatedReturns | None:
+def _from_types(scan: Scan, columns: Columns) -> StatedReturns | None:
     if "return_type" not in columns:
         return None
     kind = _whole(columns["return_type"])
@@ -125,16 +127,16 @@ def _of_types(scan: Scan, columns: Columns) -> StatedReturns | None:
         return None
     nearer, farther = scan.valid & np.isin(kind, front), scan.valid & np.isin(kind, behind)
     number = np.where(nearer, 1, np.where(farther, 2, -1))
-    return StatedReturns("return_type", number, nearer, farther, _nowhere(scan))
+    return StatedReturns("return_type", number, nearer, farther, _no_range(scan))
 
 
-def _of_tags(scan: Scan, columns: Columns) -> StatedReturns | None:
+def _from_tags(scan: Scan, columns: Columns) -> StatedReturns | None:
     if "tag" not in columns or columns["tag"].dtype.kind not in "iu":
         return None
-    return _counted(scan, "tag", _whole(columns["tag"]) >> 4 & 3)
+    return _from_numbers_alone(scan, "tag", _whole(columns["tag"]) >> 4 & 3)
 
 
-def _of_second_ranges(scan: Scan, columns: Columns) -> StatedReturns | None:
+def _from_second_ranges(scan: Scan, columns: Columns) -> StatedReturns | None:
     if not {"range", "range2"} <= columns.keys():
         return None
     first, second = (columns[name].astype(np.float64) for name in ("range", "range2"))
@@ -152,7 +154,7 @@ def _of_second_ranges(scan: Scan, columns: Columns) -> StatedReturns | None:
     return StatedReturns("range2", np.full(len(scan), -1), nearer, farther, other_range)
 
 
-def _counted(scan: Scan, name: str, number: NDArray[np.int64]) -> StatedReturns | None:
+def _from_numbers_alone(scan: Scan, name: str, number: NDArray[np.int64]) -> StatedReturns | None:
     """Returns by numbers from 0 or 1, if the number of returns of each ray is not known.
 
     The first return may be the only one of its ray; directions have to decide that.
@@ -161,7 +163,7 @@ def _counted(scan: Scan, name: str, number: NDArray[np.int64]) -> StatedReturns 
     if not len(numbers) or numbers.min() == numbers.max():
         return None
     farther = scan.valid & (number > numbers.min())
-    return StatedReturns(name, number, np.zeros(len(scan), bool), farther, _nowhere(scan))
+    return StatedReturns(name, number, np.zeros(len(scan), bool), farther, _no_range(scan))
 
 
 def _whole(column: NDArray[Any]) -> NDArray[np.int64]:
@@ -171,14 +173,14 @@ def _whole(column: NDArray[Any]) -> NDArray[np.int64]:
     return np.where(np.abs(column) < 2**31, column, -1).astype(np.int64)
 
 
-def _nowhere(scan: Scan) -> NDArray[np.float32]:
+def _no_range(scan: Scan) -> NDArray[np.float32]:
     return np.full(len(scan), np.nan, np.float32)
 
 
 _READERS: tuple[Callable[[Scan, Columns], StatedReturns | None], ...] = (
-    _of_numbers,
-    _of_las_bits,
-    _of_types,
-    _of_tags,
-    _of_second_ranges,
+    _from_numbers,
+    _from_las_bits,
+    _from_types,
+    _from_tags,
+    _from_second_ranges,
 )

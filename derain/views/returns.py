@@ -105,13 +105,13 @@ def _pair(scan: Scan) -> RayReturns:
         apart &= outwards != 0
         if (outwards[apart] < 0).sum() > (outwards[apart] > 0).sum():
             stated = replace(stated, nearer=stated.farther, farther=stated.nearer)
-    found = _of_pairs(near[apart], far[apart], ranges)
+    found = _returns_of_points(near[apart], far[apart], ranges)
     if not found.dual and stated is None:
         return RayReturns.single(len(scan))
-    return _to_rows(found, first, inverse, stated)
+    return _returns_of_rows(found, first, inverse, stated)
 
 
-def _of_pairs(
+def _returns_of_points(
     near: NDArray[np.int64], far: NDArray[np.int64], ranges: NDArray[np.float32]
 ) -> RayReturns:
     """The return number of points, from their pairs.
@@ -133,7 +133,7 @@ def _of_pairs(
     return RayReturns(nearer, farther, partner, partner_range, BY_DIRECTIONS if len(near) else "")
 
 
-def _to_rows(
+def _returns_of_rows(
     found: RayReturns,
     first: NDArray[np.int64],
     inverse: NDArray[np.int64],

@@ -128,9 +128,9 @@ def commands(config: LearnConfig, student: Student, source: Source, poses: str |
     steps: list[Sequence[str]] = []
     if config.needs_odometry(source):
         steps += [("odometry", *scans, "--out", str(_poses_file(config, source)), *columns)]
-    given = () if poses is None else ("--poses", poses)
+    pose_options = () if poses is None else ("--poses", poses)
     steps += [
-        ("teach", config.teacher, *scans, "--out", taught, *given, *columns),
+        ("teach", config.teacher, *scans, "--out", taught, *pose_options, *columns),
         ("fit", *fit_options(student.config, _settings(config, student))),
         ("export", str(config.checkpoint), "--out", str(config.out)),
     ]

@@ -146,17 +146,17 @@ def as_markdown(results: LearnResults) -> str:
     ]
     parts += [
         f"## The teacher: {results.teacher}",
-        _table(("not rain", "rain", "not known"), results.taught, _of_teacher),
+        _table(("not rain", "rain", "not known"), results.taught, _teacher_cells),
     ]
     if results.persistence is not None:
         header = ("rain to persistence", "not known to it", "rain to the teacher")
-        parts += [BESIDE_PERSISTENCE, _table(header, results.persistence, _of_persistence)]
+        parts += [BESIDE_PERSISTENCE, _table(header, results.persistence, _persistence_cells)]
     parts += _pictures(results.pictures, "teacher")
     if results.evaluated:
         parts += [
             f"## The student: {results.student}",
             AGREEMENT_EXPLAINED,
-            _table(("removed", "P", "R", "IoU"), results.agreement, _of_student),
+            _table(("removed", "P", "R", "IoU"), results.agreement, _student_cells),
         ]
         parts += _pictures(results.pictures, "removed")
         parts += ["## Held-out scans", *_pictures(results.pictures, "held_out")]
@@ -266,15 +266,15 @@ def _table(
     return markdown_table(("range", "points", *header), rows)
 
 
-def _of_teacher(band: Answers) -> Iterable[str]:
+def _teacher_cells(band: Answers) -> Iterable[str]:
     return [f"{share:.1%}" for share in band.shares]
 
 
-def _of_persistence(band: Answers) -> Iterable[str]:
+def _persistence_cells(band: Answers) -> Iterable[str]:
     return [f"{share:.1%}" for share in (*band.shares[1:], band.removed)]
 
 
-def _of_student(band: Answers) -> Iterable[str]:
+def _student_cells(band: Answers) -> Iterable[str]:
     counts = band.agreement
     scores = map(number_text, (counts.precision, counts.recall, counts.iou))
     return f"{band.removed:.1%}", *scores

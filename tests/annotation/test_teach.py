@@ -184,6 +184,6 @@ def test_where_nothing_is_known_or_scans_are_in_no_file_nothing_is_written(
     with pytest.raises(InputError, match="is sure of no point"):
         teach(Between(Dimmer(sure_within=0.0)), of(make_drive()), tmp_path / "out")
     in_memory = Frames.of_scans([Scan.of(scene(9), name="mine")] * 3)
-    with pytest.raises(InputError, match="is in no file"):
+    with pytest.raises(InputError, match="is not in a file"):
         teach(Between(), in_memory, tmp_path / "out")
     assert not (tmp_path / "out").exists()

@@ -130,7 +130,7 @@ def test_a_folder_of_something_else_is_not_cleared(refused, recording: Path) -> 
 @pytest.mark.parametrize(
     ("scans", "options", "names"),
     [
-        (2, (), "2 scans: too few to learn from some and choose by others"),
+        (2, (), "2 scans: too few for training and validation"),
         (3, ("--teacher", "nobody"), "derain: nobody: no such method or file"),
         (3, ("--poses", "none.txt", "--teacher", "dror"), "none.txt"),
     ],
@@ -154,7 +154,7 @@ def test_scans_that_nothing_connects_are_refused_with_the_reason(run_derain) -> 
     command = ("learn", recording, "--out", "model.onnx", "--teacher", "persistence")
     outcome = run_derain(*command)
     assert outcome.code == 2
-    assert "no two scans of the recording could be laid upon one another" in outcome.err
+    assert "no two scans of the recording could be registered" in outcome.err
     assert not Path("model.onnx").exists()
 
 

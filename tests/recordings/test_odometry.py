@@ -136,7 +136,7 @@ def test_a_bare_road_that_shows_no_way_along_it_is_not_trusted() -> None:
         seen = np.c_[flat, np.zeros(40_000)]
         found = odometry.register(scan_from(motion(1.3 * seed), seed, world=seen))
     assert not found.trusted
-    assert "too little stands across some direction" in found.reason
+    assert "too few surfaces face some direction" in found.reason
 
 
 @pytest.mark.parametrize("degrees", [0, 1e-9, 1e-3, 1, 90, 179.999, 180])
@@ -177,7 +177,7 @@ GOOD = Fit(np.eye(4), converged=True, residual=0.03, matched=0.9, facing=0.05)
     [
         ({"matched": LEAST_MATCHED - 0.01}, "only 49% of its surfaces"),
         ({"residual": MOST_APART + 0.001}, "its surfaces lie 0.131 m from those"),
-        ({"facing": LEAST_FACING / 2}, "too little stands across some direction"),
+        ({"facing": LEAST_FACING / 2}, "too few surfaces face some direction"),
         ({"converged": False}, "did not converge"),
     ],
 )
