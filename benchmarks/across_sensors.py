@@ -1,12 +1,12 @@
-"""One table: methods on data of many sensors, and what they take of scans without rain.
+"""Prints one table: methods on data of many sensors, and the points they remove from clean scans.
 
     python -m benchmarks.across_sensors --shared ../shared --out table
     python -m benchmarks.across_sensors --models mine=model.onnx --times 0 --out table
     python -m benchmarks.across_sensors --data "WADS sample" --out times
 
 Rows and columns are those of across_sensors.yaml, or of another `--plan`; `--models` adds rows.
-What is simulated is made below `--work`, and found there again. What is missing is left out, and
-the reason printed. Labels have a part in the scores alone.
+Simulated data are made below `--work` and reused. Missing data are left out, with the reason.
+Labels are used for the scores alone.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""Labels by geometry against the truth that the simulator knows: how well, and where they err.
+"""Compares labels by geometry with the truth of the simulator: scores and errors.
 
     python -m benchmarks.annotation
     python -m benchmarks.annotation --tracks 5 --scans 3
@@ -63,13 +63,13 @@ def sequences(tracks: int, scans: int) -> Iterator[tuple[float, list[Scan], dict
 
 @dataclass
 class Findings:
-    """What came of labelling: points by class (rows) and label (columns), and why labels err."""
+    """Counts of labelling: points by class (rows) and label (columns), and reasons of errors."""
 
     table: NDArray[np.int64] = field(default_factory=lambda: np.zeros((KINDS, KINDS), np.int64))
     reasons: Counter[str] = field(default_factory=Counter)
 
     def add(self, scan: Scan, scene: Scene, plane: Plane) -> None:
-        """Labels a scan. What the labels leave unknown does not count."""
+        """Labels a scan. Unknown labels do not count."""
         assert scan.label is not None
         label = annotate(scan, scene, plane)
         counted = label != UNKNOWN
@@ -79,7 +79,7 @@ class Findings:
 
     @property
     def agreement(self) -> float:
-        """Share of the points that are labelled as what they are."""
+        """Share of the points with the right label."""
         return float(self.table.trace() / self.table.sum())
 
     @property
@@ -91,7 +91,7 @@ class Findings:
 
 
 def _reasons(scan: Scan, label: NDArray[np.int64], scene: Scene, plane: Plane) -> dict[str, int]:
-    """Why points have a wrong label: of each point the first reason that holds."""
+    """Reasons of wrong labels: for each point the first reason that holds."""
     assert scan.label is not None
     points = scan.xyz.astype(np.float64)
     drop, over = scan.label == TrackClass.RAIN, inside(scene.rain_area or scene.road, points)

@@ -1,10 +1,10 @@
-"""What a grid and the back-projection of its pixels allow: rain IoU of a perfect labelling.
+"""Computes the IoU of rain that a grid and a back-projection allow, with perfectly labelled pixels.
 
     python benchmarks/back_projection.py WADS/sample.bin
     python benchmarks/back_projection.py WADS/sequences/36/velodyne/*.bin
     python benchmarks/back_projection.py WADS/sequences/36/velodyne/*.bin --beams
 
-Every pixel is labelled with the truth of the return that it shows; no network can do better.
+Every pixel has the true label of the return that it shows; no network can do better.
 """
 
 import argparse

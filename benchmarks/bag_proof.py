@@ -1,11 +1,11 @@
-"""Real scans as bags, cleaned, beside the same scans cleaned as files.
+"""Cleans real scans as bags, and compares them with the same scans cleaned as files.
 
     python -m benchmarks.bag_proof --shared ../shared
     python -m benchmarks.bag_proof --shared ../shared --scans 20 --reading
 
-Of each storage it makes a bag of the scans of a drive, of an IMU and of texts, runs `derain run` on
-it, and compares message by message. With ``--reading`` it times reading the bags beside reading the
-files instead, in turns.
+For each storage it makes a bag of the scans of a drive, of an IMU and of texts, runs `derain run`
+on it, and compares message by message. With ``--reading`` it times reading the bags against reading
+the files instead, in turns.
 """
 
 import argparse
@@ -78,7 +78,7 @@ def _run(method: str, scans: Sequence[Path], out: Path) -> None:
 
 
 def _prove(storage: Storage, bag: Path, made: Path, masks: Sequence[NDArray[np.bool_]]) -> bool:
-    """Compares a bag and what was made of it, by the library alone, and says what it found."""
+    """Compares a bag with its cleaned copy, by the library alone, and returns the differences."""
     before, after = read_bag(bag), read_bag(made)
     others = [(old, new) for old, new in zip(before, after, strict=False) if old[0] != POINTS]
     clouds = [_left(message, storage) for topic, _, _, message in after if topic == POINTS]

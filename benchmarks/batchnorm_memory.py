@@ -1,4 +1,4 @@
-"""What a published 3D-OutDet's first BatchNorm layer still knows of the intensities it learnt from.
+"""Recovers the training intensities of a published 3D-OutDet from its first BatchNorm layer.
 
 python -m benchmarks.batchnorm_memory outdet_rehearse3d.pt outdet_wads.pt
 

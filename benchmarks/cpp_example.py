@@ -1,12 +1,12 @@
-"""The example in C++ beside derain: the same masks, and what the stages take.
+"""Compares the example in C++ with derain: the masks, and the time of each stage.
 
     cmake -S examples/cpp -B build/cpp && cmake --build build/cpp
     python -m benchmarks.cpp_example build/cpp/derain_onnx ../shared/data/wads/drive/velodyne/*.bin
     python -m benchmarks.cpp_example build/cpp/derain_onnx SCAN.bin... --model a.onnx --model b.onnx
 
-Both clean the same scans in turns, with as many threads; in each turn all of them once before,
-untimed, for the first scans that a process cleans take longer. Prints for each model how many
-points they judge otherwise, the median of each stage, and what C++ takes of the time of derain.
+Both clean the same scans in turns, with as many threads. Each turn begins with an untimed pass over
+all scans, because the first scans of a process take longer. Prints for each model the number of
+points with different labels, the median of each stage, and the ratio of the times.
 """
 
 import argparse
@@ -45,7 +45,7 @@ def main() -> None:
 
 
 def compare(model: Path | None, arguments: argparse.Namespace) -> None:
-    """Prints what became of one model."""
+    """Prints the results of one model."""
     derainer = Derainer(model, threads=arguments.threads)
     times: dict[str, list[Times]] = {"C++": [], "derain": []}
     points = differ = 0
@@ -66,7 +66,7 @@ def compare(model: Path | None, arguments: argparse.Namespace) -> None:
 
 
 def by_program(model: Path, arguments: argparse.Namespace) -> tuple[list[NDArray[np.bool_]], Times]:
-    """What the program calls rain, and its times."""
+    """The rain found by the program, and its times."""
     scans: list[Path] = arguments.scans
     with tempfile.TemporaryDirectory() as out:
         command = [arguments.program, "--threads", str(arguments.threads), model, out]
@@ -79,7 +79,7 @@ def by_program(model: Path, arguments: argparse.Namespace) -> tuple[list[NDArray
 
 
 def by_derain(derainer: Derainer, scans: list[Path]) -> tuple[list[NDArray[np.bool_]], Times]:
-    """What derain calls rain, and its times."""
+    """The rain found by derain, and its times."""
     masks, taken = [], []
     for scan in (*scans, *scans):
         stopwatch = Stopwatch()

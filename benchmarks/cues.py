@@ -1,10 +1,10 @@
-"""What each cue of the model that comes with derain gives and costs: models with some of them.
+"""Measures the gain and the cost of each cue of the model that comes with derain.
 
     python -m benchmarks.cues --shared ../shared
 
-IoU at the model's threshold of models that are exported with geometry alone, with brightness
-weighed once, and with all, and of scans whose intensities are withheld, where brightness is silent;
-and milliseconds from scan to mask of the WADS sample, in turns, on two threads.
+Exports the model with geometry alone, with brightness weighed once, and with all. Prints the IoU of
+each at the model's threshold, and of the model on scans without intensities, which have no
+brightness; and milliseconds from scan to mask of the WADS sample, in turns, on two threads.
 """
 
 import argparse

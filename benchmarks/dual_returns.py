@@ -1,4 +1,4 @@
-"""Where the returns of rays with two are snow, on labelled scans; labels only measure.
+"""Counts the returns of dual-return rays that are snow, on labelled scans.
 
 python benchmarks/dual_returns.py WADS/drive/velodyne/0422{23,28,33}.bin
 """

@@ -1,12 +1,11 @@
-"""What methods take: of rain and of each kind of object, and of clean scans.
+"""Measures the share that methods remove: of rain, of each kind of object, and of clean scans.
 
     python benchmarks/eaten.py dror crf persistence model.onnx tuned.yaml --card wads \
         --data WADS/drive/velodyne --clean clean/*
 
-Every method is as `derain run` has it, and may be followed by settings: crf:variant=published.
-Clean scans are judged one by one, so a method that sees several sees the one alone. Their
-intensities are taken to the unit of the method, as by `derain run --intensity-scale`. Labels
-measure alone.
+A method is named as in `derain run`, and settings may follow: crf:variant=published. Clean scans
+are judged one by one, also by methods that use several. Their intensities are converted to the unit
+of the method, as by `derain run --intensity-scale`. Labels only measure.
 """
 
 import argparse
@@ -40,7 +39,7 @@ from derain.views.scan_issues import SCALE_OF_UNIT
 
 @dataclass
 class Eaten:
-    """What one method took of labelled scans.
+    """The points that one method removed from labelled scans.
 
     Attributes:
         counts: Points by whether they are rain and were called so.
@@ -130,13 +129,13 @@ def _table_of_clean(methods: Mapping[str, Method], frames: Sequence[Frame]) -> s
 
 
 def _taken(method: Method, frame: Frame) -> int:
-    """How many points of a scan, alone in its recording, are called rain."""
+    """Number of points of a scan, alone in its recording, that are called rain."""
     in_unit = frame.with_intensity_times(_factor(method, frame.read()))
     return sum(int(judgement.rain.sum()) for _, judgement, _ in judgements(method, [in_unit]))
 
 
 def _factor(method: Method, scan: Scan) -> float:
-    """What takes a scan's intensities to the unit of a method; 1 where it has none."""
+    """The factor from a scan's intensities to the unit of a method; 1 if it has none."""
     own = full_scale([scan])
     wanted = _unit_of(method)
     return wanted / own if wanted is not None and np.isfinite(own) else 1.0

@@ -1,15 +1,15 @@
 """The network published for REHEARSE-3D as an observer of the simulated facility.
 
-Nobody can get the data, but the network has seen them. It is run untouched, with the statistics of
-WADS, which its weights fit best (derain/cards/rehearse3d.yaml):
+The data are not available, but the network was trained on them. It is run unchanged, with the
+statistics of WADS, which its weights fit best (derain/cards/rehearse3d.yaml):
 
 derain simulate --out facility --sequences 25 --scans 2
 python -m benchmarks.facility_observer outdet_rehearse3d.pt facility
 
-Four tables: what its BatchNorm layer says of the intensities that it was trained on, beside those
-of the facility; its scores beside the rules of intensity and of position, learnt on the facility's
-training scans; what it calls rain where every point has one intensity; and how far a rule of
-intensity alone says what it says, where intensities have nothing to do with what is rain.
+Prints four tables: the training intensities recovered from its BatchNorm layer, beside those of the
+facility; its scores beside the rules of intensity and of position, fitted to the facility's
+training scans; the points that it calls rain if every point has one intensity; and how well a rule
+of intensity alone predicts its answers if intensities are unrelated to rain.
 """
 
 import argparse
@@ -175,7 +175,7 @@ def _scores(methods: Mapping[str, Method], examples: Sequence[Example]) -> str:
 
 
 def _at_constant_intensities(network: Method, examples: Iterable[Example]) -> str:
-    """What share of the rain and of the rest is called rain where all points have one intensity."""
+    """Share of the rain and of the rest that is called rain if all points have one intensity."""
     body = []
     for intensity in CONSTANT:
         counts = Counts()
@@ -191,7 +191,7 @@ def _at_constant_intensities(network: Method, examples: Iterable[Example]) -> st
 
 
 def _as_a_rule(network: Method, examples: Sequence[Example]) -> str:
-    """How far a limit of intensity, learnt from what the network calls rain, calls the same."""
+    """Agreement of a limit of intensity, fitted to the network's rain, with the network."""
     generator = np.random.default_rng(0)
     drawn = [(_drawn_anew(scan, generator), rain) for scan, _, rain, _ in examples]
     called = [(scan, network(scan)) for scan, _ in drawn]

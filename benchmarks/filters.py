@@ -1,4 +1,4 @@
-"""Times the filters against each other, and against the same on KD-trees and Open3D's own.
+"""Times the filters against each other, against versions on KD-trees, and against Open3D's.
 
     python benchmarks/filters.py WADS/sample.bin --threads 2
 
@@ -29,7 +29,7 @@ Method = Callable[[], NDArray[np.bool_]]
 
 
 def main() -> None:
-    """Prints the medians of all filters, and of their rivals how many times ours each is."""
+    """Prints the medians of all filters, and the ratios of their rivals to ours."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("scan", type=Path)
     parser.add_argument("--threads", type=int, default=2)
@@ -122,7 +122,7 @@ def _of_open3d(
 
 
 def _report_in_turns(scan: Scan, threads: int) -> None:
-    """Prints how long each filter takes beside DSOR."""
+    """Prints the time of each filter relative to DSOR."""
     filters = (DSOR(), CRF(), CRF(variant="published"), SSR(), SOR(), DROR(), ROR())
     # A scan of its own for every run, so that nobody finds ranges that another has worked out.
     derainers = {

@@ -1,4 +1,4 @@
-"""Cleans a source in every way that there is, compares the bytes, and kills what does it.
+"""Cleans a source by every executor, compares the bytes, and kills processes at random.
 
     python -m benchmarks.fleet drive/ --method default --block 4
     python -m benchmarks.fleet world/ --method default --kills 30 --seed 0
@@ -47,7 +47,7 @@ NOTICE = 4
 
 @dataclass(frozen=True)
 class Run:
-    """What is cleaned, and how.
+    """The source to clean, and the options.
 
     Attributes:
         source: The scans.
@@ -236,7 +236,7 @@ def kill_once(
 
 
 def short_of(out: Path, wanted: str) -> Iterator[str]:
-    """What is wrong with results that should be complete."""
+    """The faults of results that should be complete."""
     if checksum(out) != wanted:
         yield "its results are others than those of one process"
     units = [unit for unit, *_ in json.loads((out / ".derain/units.json").read_bytes())]

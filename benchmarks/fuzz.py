@@ -1,12 +1,12 @@
-"""Gives every reader damaged files, and prints what each made of them.
+"""Gives every reader damaged files, and prints the outcomes.
 
     python -m benchmarks.fuzz --inputs 100000 --workers 2
     python -m benchmarks.fuzz --replay runs/fuzz/pcd-0-1234
 
 Readers are those of scans, labels, bags, small documents, exported models and checkpoints, and
-`resume`, a training that goes on from a checkpoint. An input comes to a right result or is refused
+`resume`, a training that goes on from a checkpoint. An input must give a right result or be refused
 with an InputError; anything else is a finding: another exception, the end of the process, more than
-1 GB of memory or 10 seconds of computing. Findings lie in --out. The exit code is 1 where there are
+1 GB of memory or 10 seconds of computing. Findings lie in --out. The exit code is 1 if there are
 any.
 """
 
@@ -35,7 +35,7 @@ PORTION = 200
 
 @dataclass
 class Verdicts:
-    """What one reader made of its inputs.
+    """The outcomes of one reader.
 
     Attributes:
         counts: How many of each kind; findings are one kind.

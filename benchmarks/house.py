@@ -1,4 +1,4 @@
-"""Measures the house: code by room, modules, what a command loads, and the way of a scan.
+"""Measures the code base: lines by folder, modules, the imports of a command, and its calls.
 
     python -m benchmarks.house --scan WADS/sample.bin > house.md
 
@@ -95,7 +95,7 @@ class Module:
 
     @property
     def name(self) -> str:
-        """What others import it as."""
+        """The name under which others import it."""
         inside = self.path.with_suffix("").parts
         inside = inside if inside[0] == "derain" else ("derain", *inside)
         return ".".join(inside).removesuffix(".__init__")

@@ -1,4 +1,4 @@
-"""What each ingredient of a model gives: trains variants alike, and scores them in one table.
+"""Measures the gain of each ingredient of a model: trains variants alike, and scores them.
 
     python -m benchmarks.ingredients --plan benchmarks/ingredients.yaml --out ingredients
 
@@ -69,7 +69,7 @@ class Variant:
 
 @dataclass(frozen=True)
 class Sweep:
-    """What is trained, and where.
+    """The variants to train, and the folder.
 
     Attributes:
         data: Data sets by name, each the command of derain that makes it, but for its folder.
@@ -113,7 +113,7 @@ class Sweep:
         return self.folder / variant.folder / "model.onnx"
 
     def commands(self, variant: Variant) -> list[list[str]]:
-        """What makes the model: of the data sets that it names, of the training, and the export."""
+        """The commands that make the model: its data sets, its training, and its export."""
         sets, folder = self.folder / DATA_SETS, self.folder / variant.folder
         named = dict.fromkeys(name for name, _ in DATA_SET.findall(variant.fit))
         made = [[*shlex.split(self.data[name]), "--out", str(sets / name)] for name in named]

@@ -1,4 +1,4 @@
-"""Kills commands of derain at random moments, and judges what they leave.
+"""Kills commands of derain at random moments, and checks the files that they leave.
 
     python -m benchmarks.kills --kills 40 --seed 0
     python -m benchmarks.kills --kills 3 --commands run fuse view
@@ -69,7 +69,7 @@ class Victim:
         arguments: Of the command line.
         folder: Where it ran undisturbed.
         seconds: How long it takes undisturbed.
-        counts: What became of it, by column of the table.
+        counts: Its outcome, by column of the table.
     """
 
     arguments: Sequence[str | Path]
@@ -116,13 +116,13 @@ def undisturbed(arguments: Sequence[str | Path], folder: Path) -> Victim:
 
 
 def kill_once(victim: Victim, generator: random.Random, folder: Path, again: bool) -> list[str]:
-    """Kills a command once, counts what became of it, and tells what fell short.
+    """Kills a command once, counts the outcome, and returns the faults.
 
     Args:
         victim: The command.
         generator: Where moment and signal come from.
         folder: An empty folder to run it in.
-        again: Whether it was finished there before.
+        again: True if it was finished there before.
     """
     if again:
         shutil.copytree(victim.folder / "out", folder / "out")
@@ -183,7 +183,7 @@ def printed(folder: Path) -> str:
 
 
 def temporary_files(victim: Victim, folder: Path) -> list[Path]:
-    """What lies about that is nobody's result, and that is not left undisturbed as well."""
+    """Files that are no result, and that an undisturbed command does not leave."""
     hidden = [
         path
         for path in (folder / "out").rglob(".*")
@@ -194,7 +194,7 @@ def temporary_files(victim: Victim, folder: Path) -> list[Path]:
 
 
 def half_written(victim: Victim, folder: Path, complete: bool) -> list[str]:
-    """What is wrong with the files under their final names, or, if all should be there, missing."""
+    """The faults of files under their final names and, if all should be there, missing files."""
     expected, found = _by_name(victim.folder / "out"), _by_name(folder / "out")
     sizes = {name: file.stat().st_size for name, file in expected.items()}
     faults = [
@@ -214,7 +214,7 @@ def _by_name(folder: Path) -> dict[str, Path]:
 
 
 def fault_of(file: Path, size: int | None) -> str | None:
-    """What is wrong with a file; None if it is whole, or is one that its writer only adds to.
+    """The fault of a file; None if it is whole, or is one that its writer only adds to.
 
     Args:
         file: The file.

@@ -1,6 +1,6 @@
 """Draws one scan as each method cleans it, a picture a method, for the pages of docs/methods.
 
-How the scan is made and what is called for the networks stands in docs/methods/index.md.
+docs/methods/index.md has the commands that make the scan and the networks.
 """
 
 import argparse
@@ -51,7 +51,7 @@ def main() -> None:
 
 
 def judged(name: str, frames: Source, number: int) -> NDArray[np.bool_]:
-    """What a method calls rain in one scan of a recording, bool (N,)."""
+    """The rain that a method finds in one scan of a recording, bool (N,)."""
     method = load_method(name, {})
     judgements = [method.push(frame) for frame in frames]
     answered = [*filter(None, judgements), *method.flush()]
@@ -59,7 +59,7 @@ def judged(name: str, frames: Source, number: int) -> NDArray[np.bool_]:
 
 
 def write(scan: Scan, predicted: NDArray[np.bool_], rain: NDArray[np.bool_], path: Path) -> None:
-    """Draws a scan from above and as the sensor sees it, and what became of its points."""
+    """Draws a scan from above and as the sensor sees it, coloured by the outcome of its points."""
     figure = Figure(figsize=(10, 4.4), layout="constrained")
     counts = Counts.of(predicted, rain)
     figure.suptitle(

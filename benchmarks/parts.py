@@ -1,4 +1,4 @@
-"""Times the choices behind derain's 3D-OutDet against what they were chosen over.
+"""Times the parts of derain's 3D-OutDet against their alternatives.
 
     python benchmarks/parts.py checkpoint.ckpt scan.bin --threads 2
 

@@ -1,4 +1,4 @@
-"""What each part of persistence gives: IoU with all of it, and without one part or another.
+"""Measures the gain of each part of persistence: IoU with all parts, and without some.
 
     python benchmarks/persistence_parts.py wads WADS/drive/velodyne
     python benchmarks/persistence_parts.py kitti snowykitti/velodyne

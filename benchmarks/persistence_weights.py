@@ -39,7 +39,7 @@ from derain.views.morton import distinct_rows
 
 @dataclass(frozen=True)
 class Described:
-    """What is known of the M points of one scan.
+    """The features of the M points of one scan.
 
     Attributes:
         rays: Where rays of other scans end, and where they went through.
@@ -76,7 +76,7 @@ def main() -> None:
 
 
 def _described(roots: list[Path]) -> Iterator[Described]:
-    """What is known of each scan that has others before and after it."""
+    """The features of each scan that has others before and after it."""
     card, model = load_card("simulated"), Derainer()
     data = named_scans(roots, card, Loading())
     for recording in recordings_of(data.source("test")):
@@ -101,7 +101,7 @@ def _evidence(
     place: int,
     drops: list[NDArray[np.bool_]] | None = None,
 ) -> RayEvidence:
-    """What the rays of the scans before and after show at the points of a scan."""
+    """The evidence of the rays of the scans before and after at the points of a scan."""
     own, found = points[place], []
     for other in (place - 1, place + 1):
         to_other = np.linalg.inv(_pose(recording[other])) @ _pose(recording[place])

@@ -4,8 +4,8 @@
     python -m benchmarks.plain_install SCAN --python python3.12
 
 Builds the wheel, makes a new environment, installs the wheel without extras from the registry, and
-cleans the scan by the model of derain's own. Says what each step took, which packages there are,
-their megabytes, and that none of those is there that only an extra brings. The registry's files may
+cleans the scan by the model of derain's own. Prints the time of each step, the packages,
+their megabytes, and that no package of an extra is installed. The registry's files may
 come from pip's cache, which --cold leaves alone.
 """
 
@@ -57,7 +57,7 @@ def main() -> None:
 
 
 def refuse_extras(environment: Environment) -> None:
-    """Says that nothing is installed which only an extra brings; fails where something is."""
+    """Checks that no package of an extra is installed; fails otherwise."""
     libraries = {extra.library for extra in EXTRAS} - OF_ONNXRUNTIME
     found = environment.run(environment.python, "-c", FIND, *sorted(libraries)).split()
     if found:

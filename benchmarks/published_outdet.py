@@ -40,7 +40,7 @@ class PublishedPipeline:
         self.leaf_size = leaf_size
 
     def __call__(self, points: NDArray[np.float32]) -> NDArray[np.bool_]:
-        """Says which points, float32 (N, 4), are rain, bool (N,)."""
+        """Returns True for points, float32 (N, 4), that are rain, bool (N,)."""
         tree = KDTree(points[:, :3], leaf_size=self.leaf_size)
         distances, neighbours = tree.query(points[:, :3], k=NEIGHBOURS)
         normalised = torch.from_numpy(((points - self.mean) / self.std).astype(np.float32))

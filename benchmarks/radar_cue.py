@@ -1,4 +1,4 @@
-"""What a 4D radar would add to the default model: how near its detections lie to mistakes.
+"""Estimates the gain of a 4D radar for the default model: distances of detections to mistakes.
 
     python -m benchmarks.radar_cue --work runs/radar_cue
 
@@ -81,7 +81,7 @@ def _points(derainer: Derainer, folder: Path) -> Points:
 
 
 def _best(points: Points, threshold: float, pairs: Iterable[tuple[float, float]]) -> str:
-    """The highest IoU, and what is added near a detection and elsewhere for it."""
+    """The highest IoU, and the numbers that are added near a detection and elsewhere for it."""
     log_odds, near, rain = points
     scores = {
         (here, elsewhere): _iou(log_odds + np.where(near, here, elsewhere) > threshold, rain)

@@ -85,7 +85,7 @@ class Ros:
         return self.store.types[type_](**members)
 
     def header(self, time: int, frame: str = "velodyne") -> Any:
-        """What a message of a sensor begins with."""
+        """The header of a sensor's message."""
         stamp = self.new("builtin_interfaces/msg/Time", sec=time // 10**9, nanosec=time % 10**9)
         counter = {"seq": 7} if self.is_ros1 else {}
         return self.new("std_msgs/msg/Header", stamp=stamp, frame_id=frame, **counter)
@@ -190,7 +190,7 @@ def read_bag(path: Path) -> list[tuple[str, str, int, bytes]]:
 
 
 def connections_of(path: Path) -> list[tuple[Any, ...]]:
-    """What a bag tells of each of its topics, in its order."""
+    """The connections of a bag: each of its topics, in its order."""
     reader = rosbag1.Reader(path) if path.suffix == ".bag" else rosbag2.Reader(path)
     with reader:
         return [(c.topic, c.msgtype, c.msgdef, c.digest, c.ext) for c in reader.connections]
@@ -213,7 +213,7 @@ def _writer(path: Path, storage: Storage) -> Any:
 
 
 def _details(storage: Storage) -> dict[str, Any]:
-    """What a topic has besides: latching in ROS 1, quality of service in ROS 2."""
+    """Further settings of a topic: latching in ROS 1, quality of service in ROS 2."""
     if storage == "ros1":
         return {"callerid": "/velodyne_driver", "latching": 1}
     return {"offered_qos_profiles": [SENSOR_QOS]}

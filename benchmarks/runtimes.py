@@ -1,4 +1,4 @@
-"""Times one model by every runtime: networks alone, in turns, in one run, and what they change.
+"""Times one model by every runtime, networks alone and in turns, and counts different labels.
 
     python -m pip install 'derain[openvino]'
     python benchmarks/runtimes.py model.onnx sample.bin --threads 2

@@ -16,7 +16,7 @@ REFUSAL = b"<Error><Code>SlowDown</Code><Message>Please reduce your request rate
 
 @dataclass
 class Faults:
-    """What goes wrong with requests.
+    """Faults of requests.
 
     Attributes:
         refuse: Each so manieth request is refused as too fast; 0 for none.
@@ -32,7 +32,7 @@ class Faults:
     _lock: Lock = field(default_factory=Lock)
 
     def next(self, is_read: bool) -> tuple[bool, bool]:
-        """Whether the next request is refused, and whether what it reads is cut off."""
+        """Draws whether the next request is refused, and whether its read is cut off."""
         with self._lock:
             self.requests += 1
             self.reads += is_read

@@ -1,9 +1,9 @@
-"""Shows what it costs that several searches share the trials of a tuning.
+"""Measures the cost of several searches that share the trials of a tuning.
 
     python -m benchmarks.shared_tuning WADS/sequences/36/velodyne --filters dsor dror
 
-A search alone knows the values of all trials before its own; of several that are at work at once,
-each lacks those that the others are computing. They take turns here: all draw, then all compute.
+A single search has the values of all trials before its own; of several simultaneous searches, each
+lacks those that the others are computing. Here they take turns: all draw, then all compute.
 Printed is the IoU of the best of 100 trials, by the number of searches: mean and range over seeds.
 """
 

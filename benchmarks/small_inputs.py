@@ -28,7 +28,7 @@ SPLIT = '{train: ["00"], validation: ["01"], test: ["02"]}'
 
 
 class SmallInputs:
-    """Inputs of the commands, each made when a command first asks for it.
+    """Inputs of the commands, each made at its first use.
 
     Args:
         folder: A new folder for them.

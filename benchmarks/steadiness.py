@@ -1,4 +1,4 @@
-"""What methods make of one scan of snow after what users do to scans, and of doubled clean ones.
+"""Scores methods on one scan of snow after common changes of scans, and on doubled clean scans.
 
     python -m benchmarks.steadiness --shared ../shared --methods default old.onnx crf
 
@@ -49,12 +49,12 @@ def main() -> None:
 
 
 def iou(called: NDArray[np.bool_], rain: NDArray[np.bool_]) -> float:
-    """Intersection over union of what is called rain, bool (N,), and what is."""
+    """Intersection over union of the called rain, bool (N,), and the true rain."""
     return float((called & rain).sum() / max((called | rain).sum(), 1))
 
 
 def changed(scan: Scan) -> Iterator[tuple[str, Scan]]:
-    """The scan after what users do to it, each change with its name.
+    """The scan after each change that users make, by the name of the change.
 
     Args:
         scan: A labelled scan.

@@ -2,8 +2,8 @@
 
     python -m benchmarks.stream ../shared/data/wads/sample.bin --models default version1.onnx
 
-Scan after scan comes in ten times a second for a minute. One is late where it is not judged when
-the next comes in; the queue behind it is what a robot would have to drop.
+Scan after scan comes in ten times a second for a minute. A scan is late if it is not judged when
+the next comes in; a robot would have to drop the queue behind it.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""What an erring teacher costs its student, by how far the rarer class counts for more.
+"""Measures the cost of a teacher's errors to its student, by the weight of the rarer class.
 
 On simulated streets, of which the truth is known, labels are made to err as a teacher's do: some
 rain is taken for solid, some things, whole, for rain, as those are that move, and of some points it
@@ -97,7 +97,7 @@ def main() -> None:
 
 
 def erring(scan: Scan, generator: np.random.Generator) -> Scan:
-    """A labelled simulated scan as a teacher would label it that errs."""
+    """A labelled simulated scan with the labels of a teacher that errs."""
     label = known(scan, generator).label
     assert label is not None
     rain = label == TAUGHT_RAIN

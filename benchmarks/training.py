@@ -1,4 +1,4 @@
-"""Times what a training is made of: reading, viewing and the step of each network, and epochs.
+"""Times the parts of a training: reading, viewing and the step of each network, and epochs.
 
     python benchmarks/training.py WADS
     python benchmarks/training.py WADS --networks outdet --epochs 8

@@ -1,10 +1,10 @@
-"""What visibility, shares of rain and the alarm come to, on simulated rain and on real scans.
+"""Measures visibility, shares of rain and the alarm, on simulated rain and on real scans.
 
 python -m benchmarks.weather --shared ../shared --out weather
 
-The simulated rates are told by the true labels and by the model that comes with derain; real scans
-by the same, and by their labels where they have any. Labels only measure: no threshold is taken
-from them. Writes weather.txt, weather.png and rose.png to --out.
+Simulated rain is measured by the true labels and by the model that comes with derain; real scans by
+the model, and by their labels if they have any. Labels only measure: no threshold is taken from
+them. Writes weather.txt, weather.png and rose.png to --out.
 """
 
 import argparse
@@ -100,7 +100,7 @@ def _seen(pairs: Iterable[Iterable[ScanWeather]]) -> list[tuple[Visibility, Visi
 def _rates(
     data: Path, derainer: Derainer
 ) -> Iterator[tuple[str, list[tuple[ScanWeather, ScanWeather]]]]:
-    """Each place, with what both say of it at all rates."""
+    """Each place, with the results of both at all rates."""
     for layout, sensor in PLACES:
         scans = [_simulated(layout, sensor, rate) for rate in RATES]
         yield f"{layout}, {sensor}, simulated", [_by_both(derainer, *pair) for pair in scans]
@@ -113,7 +113,7 @@ def _rates(
 
 
 def _simulated(layout: str, sensor: str, rate: float) -> tuple[Scan, NDArray[np.bool_]]:
-    """A scan of one place at a rate, and what is rain of it."""
+    """A scan of one place at a rate, and its rain."""
     campaign = Campaign(1, 0, 0, scans=1, rain_rates=(rate,), sensor=sensor, layout=layout)
     with tempfile.TemporaryDirectory() as folder:
         simulate_track(Path(folder) / "track", campaign)
@@ -152,7 +152,7 @@ def _real(data: Path, derainer: Derainer) -> str:
 
 
 def _labelled(path: Path, scan: Scan) -> NDArray[np.bool_] | None:
-    """What is rain or snow by the labels of a scan; None without any."""
+    """The rain or snow by the labels of a scan; None without any."""
     label = label_beside(path)
     if not label.is_file():
         return None
@@ -220,7 +220,7 @@ def _drive_tables(drive: list[tuple[str, ScanWeather, ScanWeather]]) -> Iterator
 
 
 def _speed(data: Path, derainer: Derainer, threads: int) -> str:
-    """What the weather costs beside judging a scan, as ratios of medians in one run."""
+    """Time of the weather relative to judging a scan, as ratios of medians in one run."""
     keep_freed_memory()  # as `derain run` does
     rows = [["scan", "weather / DROR", "weather / default"]]
     dror = FilterDerainer(DROR(), threads)

@@ -1,4 +1,4 @@
-"""What the reach of scans shows of fog that returns nothing, beside dry scans and without.
+"""Measures the reach of scans in fog that returns nothing, with and without dry scans.
 
 python -m benchmarks.weather_fog --shared ../shared --out weather
 
@@ -75,7 +75,7 @@ def _clean(paths: Sequence[Path], derainer: Derainer) -> str:
 
 
 def _dry_drive(drive: Sequence[Scan]) -> str:
-    """How far the reach of a drive changes by itself: its later half beside the earlier one."""
+    """Change of a drive's own reach: its later half against the earlier one."""
     weathers = list(map(_without_rain, drive))
     half = len(weathers) // 2
     alarm = Alarm(dry=dry_reach(weathers[:half]))

@@ -1,11 +1,11 @@
-"""What visibility comes to where the truth is known, with rays without return counted and not.
+"""Compares visibility with a known truth, with and without the rays that return nothing.
 
 python -m benchmarks.weather_truth --out weather
 
-Rain of several rates falls on simulated places. What the same rays tell in the open, where nothing
-but drops returns anything, depends on the sensor and the rain alone: that is the truth to which
-the figure of a place is compared. The simulation knows how many rays returned nothing, which a
-recording does not tell. Writes weather_truth.txt to --out.
+Rain of several rates falls on simulated places. The visibility of the same rays in the open, where
+only drops return anything, depends on the sensor and the rain alone: this is the truth for the
+figure of a place. The simulation counts the rays that returned nothing, which a recording does not
+hold. Writes weather_truth.txt to --out.
 """
 
 import argparse
@@ -76,7 +76,7 @@ def _together(off: NDArray[np.float64]) -> str:
 
 
 def _rows(sensor: Sensor, derainer: Derainer) -> Iterator[tuple[list[str], list[float]]]:
-    """A row of each place at each rate, and how many times the truth each way says."""
+    """A row for each place and rate, and the ratio of each way to the truth."""
     beams = sensor.beams()
     in_the_open = _nothing(len(beams), sensor)
     for place in PLACES:
@@ -96,7 +96,7 @@ def _rows(sensor: Sensor, derainer: Derainer) -> Iterator[tuple[list[str], list[
 def _recall(
     by_model: NDArray[np.bool_], scan: Scan, rain: NDArray[np.bool_], near: int, far: int
 ) -> str:
-    """Share of the drops from here to there that the model finds; of few it says nothing."""
+    """Share of the drops from here to there that the model finds; "-" for few."""
     asked = rain & (scan.range >= near) & (scan.range < far)
     return f"{by_model[asked].mean():.0%}" if asked.sum() >= FEWEST_DROPS else "-"
 
@@ -110,7 +110,7 @@ def _nothing(count: int, sensor: Sensor) -> Returns:
 def _scan(
     clear: Returns, beams: NDArray[np.float64], rate: float, sensor: Sensor
 ) -> tuple[Scan, NDArray[np.bool_]]:
-    """What a sensor sees in rain, and what is rain of it."""
+    """A sensor's scan in rain, and its rain."""
     generator = np.random.default_rng(2)
     returns = rain_on_beams(clear, beams, UniformRain(rate), sensor, generator)
     scan = sensor.measure(returns, generator)
@@ -118,7 +118,7 @@ def _scan(
 
 
 def _told(scan: Scan, rain: NDArray[np.bool_], beams: int) -> tuple[float, float]:
-    """Visibility as a scan tells it, and with the rays that returned nothing, metres."""
+    """Visibility of a scan, and with the rays that returned nothing, metres."""
     weather = ScanWeather.of(scan, rain)
     other, met = weather.ends.sum(axis=1)
     all_rays = other.copy()

@@ -1,4 +1,4 @@
-"""What a recording adds: a model alone, with the scan before each, with both, and persistence.
+"""Measures the gain of a recording: a model alone, with the scan before, with both, persistence.
 
     python -m benchmarks.with_recording --shared ../shared --out recordings.md
 
@@ -63,7 +63,7 @@ def main() -> None:
 
 
 def _measured(method: Method, found: LabelledFrames) -> str:
-    """IoU of a method over the scans, and how long each takes."""
+    """IoU of a method over the scans, and the time of each."""
     begin = time.perf_counter()
     answers = judgements(method, [frame.without_labels() for frame in found.frames])
     rain = [judgement.rain for _, judgement, _ in answers]

@@ -65,14 +65,14 @@ class Augmentation:
 
     @property
     def changes_anything(self) -> bool:
-        """Whether any scan is changed."""
+        """True if any scan is changed."""
         of_points = self.jitter_probability, self.dropping_probability, self.sector_probability
         other = self.brightness_probability, self.user_probability
         return max(*of_points, *other) > 0 or self.moves_the_sensor
 
     @property
     def moves_the_sensor(self) -> bool:
-        """Whether it turns or mirrors whole scans, each in its own way."""
+        """True if it turns or mirrors whole scans, each in its own way."""
         moving = self.rotation_probability, self.mirror_probability, self.user_probability
         return max(moving) > 0
 

@@ -37,10 +37,10 @@ class ScanDataModule(ScanData, lightning.LightningDataModule):
 
     Args:
         card: Data card of the scans; statistics it lacks are taken from the training scans.
-        loading: How the scans are read and batched.
+        loading: Options for reading and batching scans.
 
     Attributes:
-        task: What model and data agreed on before training; None before that.
+        task: Agreement of model and data before training; None before that.
     """
 
     def __init__(self, card: DataCard, loading: Loading) -> None:
@@ -57,7 +57,7 @@ class ScanDataModule(ScanData, lightning.LightningDataModule):
         return self.source(part)
 
     def draws(self) -> Draws | None:
-        """Which training scans an epoch draws; None, the default, draws each once.
+        """The training scans that an epoch draws; None, the default, draws each once.
 
         Raises:
             InputError: Missing folders or scans.
@@ -69,7 +69,7 @@ class ScanDataModule(ScanData, lightning.LightningDataModule):
 
         Args:
             columns: Columns besides the usual ones that need statistics.
-            labelled: Whether labels are read, from which the share of rain is measured.
+            labelled: True if labels are read, from which the share of rain is measured.
 
         Raises:
             InputError: A scan that cannot be read, or a column that none of them has.
@@ -85,9 +85,9 @@ class ScanDataModule(ScanData, lightning.LightningDataModule):
         """Reads some of the training scans, spread evenly, as they are in their files.
 
         Args:
-            most: How many at most.
-            columns: Which columns to keep besides the usual ones; None keeps all.
-            labelled: Whether their labels are read.
+            most: The largest number.
+            columns: Columns to keep besides the usual ones; None keeps all.
+            labelled: True if their labels are read.
 
         Raises:
             InputError: A scan or labels that cannot be read.
@@ -184,6 +184,6 @@ def _refuse_missing(channels: Sequence[str], count: NDArray[np.float64]) -> None
         if not known:
             raise InputError(
                 f"channel '{name}'",
-                "no training scan holds a number of that name",
-                "Name columns of the scans, with data.loading.columns where files do not.",
+                "no training scan has a column of numbers of that name",
+                "Name columns of the scans; data.loading.columns names those of unnamed files.",
             )

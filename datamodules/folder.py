@@ -26,7 +26,7 @@ class Folder(ScanDataModule):
         train: Patterns of the training scans, such as ``velodyne/*.bin`` or ``**/*.pcd``.
         validation: Patterns of the validation scans.
         test: Patterns of the scans for test and prediction.
-        loading: How the scans are read and batched.
+        loading: Options for reading and batching scans.
     """
 
     def __init__(

@@ -37,7 +37,7 @@ class InMemory(ScanDataModule):
         validation: The validation scans.
         test: The scans for test and prediction.
         card: Their data card: itself, the name of a packaged one, or a YAML file.
-        loading: How the scans are batched.
+        loading: Options for batching scans.
 
     Raises:
         InputError: No such data card, or anything but scans.

@@ -26,9 +26,9 @@ class LabelledScans(ScanData):
 
     Args:
         card: Data card of the scans.
-        loading: How the scans are read.
+        loading: Options for reading scans.
         source_of: Returns the scans of a part.
-        has_parts: Whether the parts differ; where not, every part is all scans.
+        has_parts: True if the parts differ; where not, every part is all scans.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> L
             ``sequences`` and the split of its manifest if it is simulated, else of its card; or a
             folder that ``derain teach`` wrote, whose labels are used.
         card: Data card of the scans.
-        loading: How the scans are read.
+        loading: Options for reading scans.
 
     Raises:
         InputError: A root beside other paths, or one whose sequences hold no known folder of
@@ -73,7 +73,7 @@ def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> L
     if len(paths) > 1:
         raise InputError(
             root,
-            "is a data set, of which no part can be taken beside other scans",
+            "is a data set, and cannot be combined with other scans",
             "Name it alone, or its sequences one by one.",
         )
     if taught:
@@ -93,7 +93,7 @@ def named_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> Labe
         paths: Scans, folders with scans directly in them, and sequences.
         card: Data card of the scans. Its layout is the first to be searched for sequences and
             labels.
-        loading: How the scans are read.
+        loading: Options for reading scans.
     """
 
     def source_of(part: Part) -> Source:
@@ -135,7 +135,7 @@ def rain_rates(paths: Sequence[Path], file: Path | None) -> Mapping[str, float]:
     """Rain rate of each sequence in mm/h, by its name, where it is known.
 
     Args:
-        paths: What ``--data`` names.
+        paths: Paths of ``--data``.
         file: YAML file of ``"<sequence>": <mm/h>``; None takes a simulated data set's manifest.
 
     Raises:

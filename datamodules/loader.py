@@ -45,14 +45,14 @@ def scan_loader(
 
     Args:
         source: The scans, with their labels where they have any.
-        part: What they are read for. Training has a new order and augmentation every epoch: call
-            the sampler's ``set_epoch``, as a trainer does. The other parts are read in order and
-            unchanged; for prediction without labels and with all rows.
-        task: What model and data agreed on.
-        loading: How the scans are read and batched. The source itself knows the columns of files.
-        processes: How many processes share the scans.
-        process: Which of them this is.
-        draws: Which scans an epoch of training draws; None draws each once.
+        part: Part that they are read for. Training has a new order and augmentation every epoch:
+            call the sampler's ``set_epoch``, as a trainer does. The other parts are read in order
+            and unchanged; for prediction without labels and with all rows.
+        task: Agreement of model and data.
+        loading: Options for batching scans. The source has the columns of files.
+        processes: Number of processes that share the scans.
+        process: Number of this process.
+        draws: The scans that an epoch of training draws; None draws each once.
 
     Raises:
         InputError: Labels missing where they are needed; or a network that sees several scans,
@@ -62,13 +62,13 @@ def scan_loader(
     if part == "train" and loading.augmentation.moves_the_sensor and not view.window.is_one_scan:
         raise InputError(
             "augmentation",
-            "would turn a scan and leave those around it, which the network sees too",
+            "would turn a scan but not the scans around it, which the network also sees",
             "Set rotation_probability and mirror_probability to 0.",
         )
     reader = FrameReader(task.card, loading.intensity_scale, task.columns)
     once = loading.counts_once(task.card)
     augmented = part == "train" and loading.augmentation.changes_anything
-    # Tests and predictions ask for each scan once.
+    # Tests and predictions read each scan once.
     room = loading.cache_mb * MEGABYTE if part in ("train", "validation") else 0
     dataset = ScanDataset(
         # Frames to predict keep the path of their labels: predictions must not overwrite them.
@@ -100,7 +100,7 @@ def scan_loader(
 
 
 class LateLoader(DataLoader[Sample | InputError]):
-    """Starts to read when the first batch is asked for, and raises the errors of workers.
+    """Starts to read at the first batch, and raises the errors of workers.
 
     When a run resumes from a checkpoint, Lightning makes the iterators before it sets the epoch,
     and workers read ahead as soon as there is an iterator.

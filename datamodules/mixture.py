@@ -31,7 +31,7 @@ class Mixture(ScanDataModule):
 
     Each part's own ``loading`` determines how its files are read (columns, unit of intensity);
     batches, workers and augmentation are the mixture's. Points at one position are measured once
-    if any part's card asks for it.
+    if any part's card requires it.
 
     Example:
         >>> from derain.datamodules.folder import Folder
@@ -50,7 +50,7 @@ class Mixture(ScanDataModule):
         scans_per_epoch: Scans that an epoch of training draws; by default as many as all parts have
             together. A part with fewer scans than its share repeats them.
         measured: Names of the parts that are validated, tested and predicted; by default all.
-        loading: How the scans are batched.
+        loading: Options for batching scans.
 
     Raises:
         InputError: No parts, or none with rain; a weight that is not greater than 0; the name of no
@@ -116,7 +116,7 @@ class Mixture(ScanDataModule):
         )
 
     def draws(self) -> Draws:
-        """How many scans of each part an epoch draws.
+        """Number of scans of each part that an epoch draws.
 
         Raises:
             InputError: A part without training scans, or too light for a single one.
@@ -175,7 +175,7 @@ class Mixture(ScanDataModule):
                 if scan.channel(channel) is None:
                     raise InputError(
                         f"part '{name}'",
-                        f"{scan.name} has no {channel}, which the model is to see",
+                        f"{scan.name} has no {channel}, which the model needs",
                         "Leave the part out, or leave the channel out of --model.channels.",
                     )
 

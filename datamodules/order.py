@@ -1,4 +1,4 @@
-"""Which scans an epoch draws, and in which order a process reads them."""
+"""The scans that an epoch draws, and the order in which a process reads them."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence, Sized
@@ -22,8 +22,8 @@ class Pick(NamedTuple):
     Attributes:
         number: Its number among the scans of its part.
         epoch: The epoch that it is read in.
-        measured: Whether the network's answer is counted or written.
-        again: How often it was drawn before in that epoch.
+        measured: True if the network's answer is counted or written.
+        again: Number of times that it was drawn before in that epoch.
     """
 
     number: int
@@ -34,7 +34,7 @@ class Pick(NamedTuple):
 
 @dataclass(frozen=True)
 class Draws:
-    """How many scans an epoch of training draws from each of several data sets, and which.
+    """The number of scans that an epoch draws from each of several data sets, and the choice.
 
     The scans of all data sets are numbered consecutively. Each data set is passed through again and
     again, in a new order every time, and an epoch continues where the last one ended, so that all
@@ -43,7 +43,7 @@ class Draws:
 
     Attributes:
         scans: Number of scans of each data set, in order.
-        drawn: How many of them an epoch draws, in the same order.
+        drawn: Number of scans that an epoch draws of each, in the same order.
     """
 
     scans: tuple[int, ...]
@@ -113,9 +113,9 @@ class TrainingOrder(DistributedSampler[Pick]):
     Args:
         scans: The scans.
         seed: Seed of the run.
-        processes: How many processes share the scans.
-        process: Which of them this is.
-        draws: Which of the scans an epoch draws; None draws each once.
+        processes: Number of processes that share the scans.
+        process: Number of this process.
+        draws: The scans that an epoch draws; None draws each once.
     """
 
     def __init__(
@@ -127,7 +127,7 @@ class TrainingOrder(DistributedSampler[Pick]):
         draws: Draws | None = None,
     ) -> None:
         drawn = len(scans) if draws is None else sum(draws.drawn)
-        # The base class only asks for the number of scans.
+        # The base class only needs the number of scans.
         super().__init__(cast("ScanDataset", range(drawn)), processes, process, seed=seed)
         self.scans = len(scans)
         self.draws = draws
@@ -155,8 +155,8 @@ class MeasuringOrder(DistributedSampler[Pick]):
     Args:
         scans: The scans.
         batch_size: Scans in a batch.
-        processes: How many processes share the scans.
-        process: Which of them this is.
+        processes: Number of processes that share the scans.
+        process: Number of this process.
     """
 
     def __init__(self, scans: "ScanDataset", batch_size: int, processes: int, process: int) -> None:

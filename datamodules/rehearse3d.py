@@ -20,7 +20,7 @@ class Rehearse3D(SequenceDataModule):
         root: Folder ``REHEARSE3D_PUBLIC``.
         layout: Names of its folders.
         split: Sequences of ``train``, ``validation`` and ``test``, in place of the official ones.
-        loading: How the scans are read and batched.
+        loading: Options for reading and batching scans.
 
     Source: sporsho/sporsho.github.io, REHEARSE3D.md, and the published ``data_cfg.yaml``.
     """

@@ -18,7 +18,7 @@ class ScanCheck(lightning.Callback):
     It checks before the first batch: hours of training on a wrong unit would be lost.
 
     Args:
-        scans: How many scans of a part are checked, spread evenly.
+        scans: Number of scans of a part to check, spread evenly.
     """
 
     def __init__(self, scans: int = 10) -> None:

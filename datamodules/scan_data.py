@@ -26,16 +26,16 @@ Part = Literal["train", "validation", "test", "predict"]
 
 @dataclass(frozen=True)
 class Loading:
-    """How scans are read and batched.
+    """Options for reading and batching scans.
 
     Attributes:
         batch_size: Scans in a batch.
         workers: Processes that read and view scans; 0 does it in the training process.
         columns: Names of the columns of files that do not name them.
         intensity_scale: Factor from the scans' intensities to the unit of the data card, e.g. 255.
-        deduplicate: Whether points at one position are measured once; None follows the data card.
+        deduplicate: True if points at one position are measured once; None follows the data card.
             Predictions cover every row in any case.
-        augmentation: How training changes its scans.
+        augmentation: Augmentation of training scans.
         cache_mb: Memory in which training scans are kept from epoch to epoch, so that they
             are not read again, and as much for validation scans. Workers divide it among them.
 
@@ -58,7 +58,7 @@ class Loading:
                 raise InputError(name, f"{value} is too few", f"Give {fewest} or more.")
 
     def counts_once(self, card: DataCard) -> bool:
-        """Whether points at one position are measured once."""
+        """True if points at one position are measured once."""
         return card.deduplicate if self.deduplicate is None else self.deduplicate
 
 
@@ -67,7 +67,7 @@ class ScanData(ABC):
 
     Args:
         card: Data card of the scans.
-        loading: How the scans are read.
+        loading: Options for reading scans.
     """
 
     def __init__(self, card: DataCard, loading: Loading) -> None:
@@ -76,7 +76,7 @@ class ScanData(ABC):
 
     @property
     def distinct(self) -> bool:
-        """Whether points at one position are measured once."""
+        """True if points at one position are measured once."""
         return self.loading.counts_once(self.card)
 
     @abstractmethod
@@ -113,7 +113,7 @@ class ScanData(ABC):
 
     @property
     def _reads_labels(self) -> bool:
-        """Whether training and validation need labels."""
+        """True if training and validation need labels."""
         return True
 
     @property
@@ -130,7 +130,7 @@ def with_needed_labels(source: Source, part: Part, reads_labels: bool) -> Source
     Args:
         source: The frames, with the labels they have.
         part: The part.
-        reads_labels: Whether the model learns from labels.
+        reads_labels: True if the model learns from labels.
 
     Raises:
         InputError: Labels missing where they are needed.

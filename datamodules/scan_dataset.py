@@ -35,7 +35,7 @@ class ScanDataset(Dataset[Sample | InputError]):
     Args:
         frames: The frames.
         read: Reads the scan of a frame, as the network sees it.
-        view: What the network sees.
+        view: The network's view.
         reader: Reads scans as they are in their files; its data card names the labels of rain.
         augmentation: Changes each scan newly every epoch; None changes nothing.
         seed: Seed of the run; with epoch and scan it determines the augmentation.
@@ -76,7 +76,7 @@ class ScanDataset(Dataset[Sample | InputError]):
         """Reads some of the scans, spread evenly, as they are in their files.
 
         Args:
-            most: How many at most.
+            most: The largest number.
 
         Raises:
             InputError: A scan that cannot be read.
@@ -114,10 +114,10 @@ class ScanDataset(Dataset[Sample | InputError]):
 
 
 class Cache:
-    """Items by number, as many as there is room for.
+    """Items by number, as many as fit into memory.
 
-    The first items stay. Every epoch asks for each item once: a cache that evicted the oldest would
-    have evicted each item by the time it is asked for again.
+    The first items stay. Every epoch needs each item once: a cache that evicted the oldest would
+    have evicted each item before its next use.
 
     Args:
         room: Bytes that the arrays of all items together may fill.
@@ -160,7 +160,7 @@ def view_in_window(
     number: int,
     read: Callable[[Frame], Scan],
 ) -> ViewedScan:
-    """What a network sees of a scan, with the scans around it where its view needs them.
+    """A network's view of a scan, with the scans around it if the view needs them.
 
     Args:
         view: The view.

@@ -19,7 +19,7 @@ class SequenceDataModule(ScanDataModule):
         card: Data card of the scans.
         layout: Names of its folders.
         split: Sequences of ``train``, ``validation`` and ``test``; by default the data card's.
-        loading: How the scans are read and batched.
+        loading: Options for reading and batching scans.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class Sequences(SequenceDataModule):
         root: Folder of the data set.
         card: Name of a packaged data card, or a YAML file.
         split: Sequences of ``train``, ``validation`` and ``test``, in place of the card's.
-        loading: How the scans are read and batched.
+        loading: Options for reading and batching scans.
     """
 
     def __init__(

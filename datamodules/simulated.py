@@ -20,8 +20,8 @@ class SimulatedDataModule(SequenceDataModule):
     Args:
         root: Folder of the data set.
         campaign: The simulation, run where the folder does not hold its result.
-        make: Whether to run it; False takes any simulated data set in the folder.
-        loading: How the scans are read and batched.
+        make: True to run it; False takes any simulated data set in the folder.
+        loading: Options for reading and batching scans.
         workers: Processes that simulate; 0 takes one per core.
 
     Raises:
@@ -68,15 +68,15 @@ class Simulated(SimulatedDataModule):
     Simulated rain is easy to find: scores on it are no evidence of quality on real rain.
 
     Example:
-        >>> data = Simulated("rain")  # nothing is simulated before training asks for it
+        >>> data = Simulated("rain")  # nothing is simulated before training needs it
         >>> data.split["validation"]
         ['016', '017', '018', '019']
 
     Args:
         root: Folder of the data set.
         campaign: The simulation, run where the folder does not hold its result.
-        make: Whether to run it; False takes any data set that ``derain simulate`` wrote there.
-        loading: How the scans are read and batched.
+        make: True to run it; False takes any data set that ``derain simulate`` wrote there.
+        loading: Options for reading and batching scans.
 
     Raises:
         InputError: No simulated data set in the folder, where none is made.

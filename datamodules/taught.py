@@ -31,7 +31,7 @@ class Taught(ScanDataModule):
 
     Args:
         root: The folder that ``derain teach`` wrote.
-        loading: How the scans are read and batched; their columns and the unit of their
+        loading: Options for reading and batching scans; their columns and the unit of their
             intensities are those that the teacher read.
 
     Raises:

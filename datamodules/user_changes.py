@@ -1,4 +1,4 @@
-"""What users do to scans before they clean them: thin, shake, double, move, cut, scale, tilt.
+"""Augmentations that imitate users' changes to scans: thin, shake, double, move, cut, scale, tilt.
 
 A network that has met all of these in its training does not depend on any.
 """
@@ -53,7 +53,7 @@ def changed_as_by_users(scan: Scan, generator: np.random.Generator) -> Scan:
 
 
 def thinned(scan: Scan, generator: np.random.Generator) -> Scan:
-    """A scan of which points are missing at random."""
+    """A scan with points missing at random."""
     return _of_enough(scan, generator.random(len(scan)) < log_uniform(SHARE_KEPT, generator))
 
 
@@ -69,7 +69,7 @@ def shaken_along(scan: Scan, generator: np.random.Generator) -> Scan:
 
 
 def doubled(scan: Scan, generator: np.random.Generator) -> Scan:
-    """A scan of which half of the points, or all, are written twice, hardly apart."""
+    """A scan with half of its points, or all, written twice, hardly apart."""
     twice = np.flatnonzero(generator.random(len(scan)) < generator.choice([0.5, 1.0]))
     apart = generator.normal(0, log_uniform(APART, generator), len(twice))
     copies = along(scan.xyz[twice], apart)
@@ -116,7 +116,7 @@ def along(xyz: NDArray[np.float32], metres: NDArray[np.float64]) -> NDArray[np.f
 
     Args:
         xyz: Positions in the sensor's frame, none at the origin, float32 (N, 3), metres.
-        metres: How far, float64 (N,).
+        metres: Distances, float64 (N,).
     """
     return (xyz + _rays(xyz) * metres[:, None]).astype(np.float32)
 
@@ -139,7 +139,7 @@ def across(
 
 
 def in_sector(scan: Scan, width: float, generator: np.random.Generator) -> NDArray[np.bool_]:
-    """Which points are in a sector around one of the valid ones, of which there must be one.
+    """True for points in a sector around one of the valid points; at least one must be valid.
 
     Args:
         scan: The scan.

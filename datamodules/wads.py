@@ -21,7 +21,7 @@ class Wads(SequenceDataModule):
         root: Folder of the data set.
         layout: Names of its folders.
         split: Sequences of ``train``, ``validation`` and ``test``, in place of the published ones.
-        loading: How the scans are read and batched.
+        loading: Options for reading and batching scans.
 
     Source: A. Kurup, J. Bos, "DSOR: A Scalable Statistical Filter for Removing Falling Snow from
     LiDAR Point Clouds in Severe Winter Weather", 2021; split: sporsho/3D_OutDet.

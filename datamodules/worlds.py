@@ -11,16 +11,16 @@ class Worlds(SimulatedDataModule):
     They train models for sensors and places that are not in any training data.
 
     Example:
-        >>> data = Worlds("worlds")  # nothing is simulated before training asks for it
+        >>> data = Worlds("worlds")  # nothing is simulated before training needs it
         >>> len(data.split["train"]), data.split["validation"][0]
         (1000, '01000')
 
     Args:
         root: Folder of the data set.
         campaign: The simulation, run where the folder does not hold its result.
-        make: Whether to run it; False takes what ``derain simulate --world`` wrote there.
+        make: True to run it; False takes what ``derain simulate --world`` wrote there.
         workers: Processes that simulate; 0 takes one per core.
-        loading: How the scans are read and batched.
+        loading: Options for reading and batching scans.
 
     Raises:
         InputError: Nothing is to be made, and there is no simulated data set in the folder.

@@ -6,12 +6,12 @@
     rain = derain.Derainer("model.onnx")(scan)
     derain.write_scan("clean.pcd", scan.take(~rain))
 
-``import derain`` by itself loads none of what it offers, so that it stays quick and needs no torch:
-a name is imported when it is first asked for. The names, and where each comes from, stand in one
-table, the type stub ``__init__.pyi`` beside this file, which type checkers and editors read too.
+``import derain`` loads no submodule, so that it is fast and needs no torch: each name is imported
+at its first use. The type stub ``__init__.pyi`` beside this file lists the names and their modules;
+type checkers and editors read it too.
 
-What trains networks needs ``pip install 'derain[train]'``. Without it those names raise an
-``ImportError`` that says so, and are left out of what is listed here.
+Names for training need ``pip install 'derain[train]'``. Without it they raise an ``ImportError``
+with this command, and ``dir(derain)`` omits them.
 """
 
 import sys
@@ -37,7 +37,7 @@ def _table() -> dict[str, str]:
 
 _MODULE_OF = _table()
 
-# Packages whose modules train networks, and what they are made of.
+# Packages whose modules train networks, and the libraries that they need.
 _TRAINING = (
     *("derain.models.", "derain.datamodules."),
     *("derain.workflows.fit", "derain.workflows.learn"),
@@ -46,7 +46,7 @@ _TORCH = "torch"
 
 
 def __getattr__(name: str) -> object:
-    """Imports a name of the table when it is first asked for."""
+    """Imports a name of the table at its first use."""
     if name == "__all__":
         return ["__version__", *_importable()]
     if name not in _MODULE_OF:
@@ -68,7 +68,7 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    """What stands in this module, with the names that are not imported yet."""
+    """Names of this module, including those that are not imported yet."""
     return sorted({*globals(), "__all__", *_importable()})
 
 

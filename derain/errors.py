@@ -1,18 +1,18 @@
-"""The error and the warning that a user meets, and the name that a misspelt one may stand for."""
+"""The error and the warning for users, and suggestions for misspelt names."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import Path
 
-# A reason longer than this hides what it says; what made it so long may be millions of characters.
+# Longer reasons cannot be read: a damaged file may put millions of characters into one.
 LONGEST_REASON = 1000
 
-# The longest path of Linux has 4,096 bytes, and what stands in the file is named after it.
+# The longest path of Linux has 4,096 bytes; the name of a part of the file follows it.
 LONGEST_SUBJECT = 5000
 
 
 class InputError(ValueError):
-    """Something the user gave cannot be used.
+    """An input of the user cannot be used.
 
     The command line prints it on one line and exits with code 2.
 
@@ -24,13 +24,13 @@ class InputError(ValueError):
         missing.pcd: there is no such file. Check the path.
 
     Args:
-        subject: What it is about: a file, a folder or an option.
-        reason: What is wrong with it.
-        remedy: What the user can do.
+        subject: The input: a file, a folder or an option.
+        reason: The fault of the input.
+        remedy: The step that the user can take.
     """
 
     def __init__(self, subject: str | Path, reason: str, remedy: str) -> None:
-        reason = " ".join(reason.split())  # what other libraries say may run over several lines
+        reason = " ".join(reason.split())  # messages of other libraries may have several lines
         reason, remedy = _cut(reason, LONGEST_REASON), _cut(remedy, LONGEST_REASON)
         super().__init__(printable(f"{_cut(str(subject), LONGEST_SUBJECT)}: {reason}. {remedy}"))
         self.subject = subject
@@ -43,24 +43,24 @@ class InputError(ValueError):
 
 
 def did_you_mean(name: object, names: Iterable[str]) -> str:
-    """The beginning of a remedy for an unknown name: a question, where a known one is much like it.
+    """The beginning of a remedy for an unknown name: a question if a known name is similar.
 
     Args:
-        name: What the user wrote.
-        names: The names that there are.
+        name: The name that the user gave.
+        names: The known names.
     """
     alike = get_close_matches(str(name)[:LONGEST_REASON], list(names), n=1)
     return f"Did you mean {alike[0]}? " if alike else ""
 
 
 class ScanWarning(UserWarning):
-    """A scan may not suit the method that judges it: a Python program is warned by this category.
+    """The category of warnings in Python about a scan that may not suit the method that judges it.
 
-    What it warns of is what commands print on stderr: coordinates that are not those of one sensor
-    in metres, intensities of another unit or not measured, channels that the scan has not got, many
-    points outside the grid of a model, or more points called rain than rain ever was. A method
-    warns of each of these once. It examines its first scan and one in a hundred after that, and
-    looks in every scan at the share that is called rain.
+    Commands print the same on stderr: coordinates that are not those of one sensor in metres,
+    intensities in another unit or not measured, channels that the scan lacks, many points outside
+    the grid of a model, or more points called rain than in any rain. A method warns of each of
+    these once. It examines its first scan and one in a hundred after that, and checks the share of
+    rain in every scan.
 
     Example:
         >>> import warnings
@@ -77,14 +77,14 @@ def _cut(text: str, longest: int) -> str:
 
 
 def printable(text: str) -> str:
-    """The same text with escapes for what a terminal must not be sent.
+    """The text with escapes in place of control characters, which a terminal must not receive.
 
-    Names of files and what stands in them may hold control sequences, line breaks, marks that turn
-    the direction of writing, and bytes that are no text.
+    Names and contents of files may hold control sequences, line breaks, marks that change the
+    direction of writing, and bytes that are not text.
     """
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def reason_of(error: Exception) -> str:
-    """What an error says, in one line; its kind where it says nothing, as a bare assert does."""
+    """The message of an error in one line; its class if it has none, as a bare assert."""
     return " ".join(str(error).split()) or type(error).__name__

@@ -40,7 +40,7 @@ def nearest_in_time(
     Args:
         times: Times, float64 (N,), seconds, in any order.
         among: Times to choose from, float64 (M,), seconds of the same clock, in any order.
-        within: How far away the nearest may be, seconds, inclusive.
+        within: Largest distance in time, seconds, inclusive.
 
     Returns:
         Rows of ``among``, int64 (N,); -1 where none is so near.
@@ -74,7 +74,7 @@ def fuse(
         radar: The radar's frame. Its labels are kept; if it has none, each of its points gets that
             of the nearest LiDAR point.
         extrinsics: Takes points of the radar into the LiDAR's frame.
-        label_within: How far a LiDAR point's label reaches, metres.
+        label_within: Largest distance of a LiDAR point's label, metres.
         channels: Fields of the radar frame to carry along, such as doppler and rcs.
 
     Returns:
@@ -113,7 +113,7 @@ def transfer_labels(
     Args:
         labelled: A scan with labels.
         xyz: The points to label, float32 (N, 3), metres, in the frame of the scan.
-        within: How far away the nearest point may be, metres, inclusive.
+        within: Largest distance of the nearest point, metres, inclusive.
 
     Returns:
         Semantic class ids, int64 (N,); ``UNKNOWN`` where nothing is so near, and for points that

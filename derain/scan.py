@@ -46,7 +46,7 @@ class PointHeader(Protocol):
 
 @runtime_checkable
 class PartialHeader(Protocol):
-    """A header that knows which parts of its file are not in the scan, and so are not written."""
+    """A header that lists the parts of its file that are not in the scan, so are not written."""
 
     @property
     def left_out(self) -> tuple[str, ...]:
@@ -57,7 +57,7 @@ class PartialHeader(Protocol):
 class Scan:
     """One point cloud, in the order of its file; rows are never dropped or reordered.
 
-    A scan copies the arrays that it is given, so that a buffer may be filled anew while scans made
+    A scan copies the arrays that it is given, so that a buffer may be filled again while scans made
     of it are in use.
 
     Example:
@@ -78,7 +78,7 @@ class Scan:
             what a writer needs to give the file back bit for bit. Read-only. Empty for a scan made
             in memory.
         shape: (height, width) of an organised cloud, rows in row-major order; else None.
-        name: Where the scan came from, for messages.
+        name: Source of the scan, for messages.
         header: The content of the file besides its columns, such as the encoding of a PCD. Only the
             writer of the same format looks into it. One that speaks of single points is a
             PointHeader, one with parts that are not written a PartialHeader.
@@ -142,7 +142,7 @@ class Scan:
         Args:
             points: A Scan, or (N, ≥ 3) numbers: x, y, z in metres, then intensity if there is a
                 fourth column. Further columns are ignored.
-            name: What to call the array in messages.
+            name: Name of the array in messages.
 
         Raises:
             InputError: Something else than an array of numbers, or one of another shape.
@@ -255,7 +255,7 @@ class Scan:
         Cells without a return, which hold −1, keep it: that is a mark and no intensity.
 
         Args:
-            factor: What every intensity is multiplied by, such as 255 to go from 0..1 to 0..255.
+            factor: Factor of every intensity, such as 255 to go from 0..1 to 0..255.
 
         Raises:
             InputError: A factor that is not a finite number above 0.
@@ -291,7 +291,7 @@ class Scan:
 
     @cached_property
     def _knows_intensity(self) -> bool:
-        """Whether any intensity is a number that a sensor can measure."""
+        """True if any intensity is a number that a sensor can measure."""
         assert self.intensity is not None
         return bool((np.abs(self.intensity) <= LARGEST_VALUE).any())
 
@@ -308,7 +308,7 @@ def named(columns: Mapping[str, Named], name: str, subject: str | Path) -> Named
     Args:
         columns: Columns by name.
         name: The name.
-        subject: What messages call the file.
+        subject: Name of the file in messages.
 
     Returns:
         None where there is no such column.

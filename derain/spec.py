@@ -28,7 +28,7 @@ GONE = "dual_return"
 
 @dataclass(frozen=True)
 class Spec:
-    """How a trained network is used; in its checkpoint and in its ONNX file.
+    """The description of how a trained network is used, in its checkpoint and its ONNX file.
 
     Attributes:
         network: Name of the network, such as ``outdet``.
@@ -45,7 +45,7 @@ class Spec:
         data: Name of the training data.
         licence: Licence of the training data.
         candidates: Bounds outside which it calls nothing rain; None where it judges every point.
-        training: What it was trained on, by `derain.sources.training_record`: names of
+        training: Training data, by `derain.sources.training_record`: names of
             sequences, fingerprints of scans. Empty where that is not known.
         schema: Version of this layout.
     """
@@ -75,7 +75,7 @@ class Spec:
         """Reads a Spec back. It is not trusted: every value is looked at before it is used.
 
         Args:
-            content: What :meth:`as_dict` gave, of this derain or of an earlier one: what has a
+            content: A result of :meth:`as_dict`, of this derain or of an earlier one: what has a
                 default may be missing.
             source: The file it was found in, for messages.
 
@@ -102,15 +102,15 @@ class Spec:
 
     @property
     def weighs_intensity(self) -> bool:
-        """Whether intensities matter to the network, as a channel or by how its view ranks them."""
+        """True if intensities matter to the network, as a channel or by how its view ranks them."""
         return "intensity" in self.channels or VIEWS[self.view["kind"]].WEIGHS_INTENSITY
 
     def missing_channels(self, scan: Scan) -> dict[str, float]:
-        """Channels that a scan has not got, and the means that stand in for them, by name."""
+        """Channels that a scan lacks, and the means that replace them, by name."""
         return {name: mean for name, mean in self.means.items() if scan.channel(name) is None}
 
     def issues(self, scan: Scan) -> Iterator[ScanIssue]:
-        """What is odd about a scan for the network, before it is judged.
+        """Warnings about a scan for the network, before it is judged.
 
         Args:
             scan: The scan, its intensities in the unit of the training data.
@@ -120,7 +120,7 @@ class Spec:
         mean = self.means.get("intensity", 0.0)  # 0 for a network that sees none
         yield from intensity_unlike_training(scan, mean, self.intensity_unit, self.data)
         if self.weighs_intensity and "intensity" not in self.channels:
-            yield from missing_intensity(scan, "rain is found by geometry alone, and less of it")
+            yield from missing_intensity(scan, "the model uses geometry alone, and finds less rain")
 
     def make_view(self, threads: int = 0) -> View:
         """The view that the network sees a scan through.
@@ -129,7 +129,7 @@ class Spec:
             threads: Threads it may use; 0 takes every core this process may use.
 
         Raises:
-            InputError: A kind of view that this derain does not know, or that has no candidates.
+            InputError: An unknown kind of view, or one without candidates.
         """
         return _view_of(Entry(self.network, "view", dict(self.view)), self, threads)
 
@@ -167,7 +167,9 @@ def _refuse_contradictions(spec: Spec, entry: Entry) -> None:
         )
     bounds = () if spec.candidates is None else spec.candidates.bounds
     if not {bound.channel for bound in bounds} <= set(bounded_channels(spec.channels)):
-        raise entry.fault("its candidates are bounded by what it does not see", "Leave them out.")
+        raise entry.fault(
+            "its candidates have bounds of channels that it does not see", "Leave them out."
+        )
     if not set(spec.rain) <= set(spec.classes):
         raise entry.fault(f"rain {shown(spec.rain)} is not of its classes", "Name ids of them.")
 

@@ -1,4 +1,4 @@
-"""The ONNX contract in NumPy: what derain's runtime does with a model, without derain.
+"""The ONNX contract in NumPy: runs a model as derain does, without derain.
 
 It follows ``docs/onnx_contract.md`` step by step and searches by brute force, which takes minutes
 for a whole scan: it is there to port from, and to check a port against::
@@ -98,7 +98,7 @@ class Model:
 
 
 def is_as_exported(content: bytes, known: dict[str, Any]) -> bool:
-    """Whether the checksum is right; it is missing only in files laid out as derain 0.1's were."""
+    """True if the checksum is right; it is missing only in files laid out as derain 0.1's were."""
     if "sha256" not in known:
         early = known.keys() <= {"spec", "versions", "proof"}
         return early and not known["spec"].keys() & {"candidates", "training"}
@@ -120,7 +120,7 @@ def valid_rows(points: Points) -> NDArray[np.bool_]:
 
 
 def knows_intensity(points: Points) -> bool:
-    """Whether any intensity is one that a sensor can measure."""
+    """True if any intensity is one that a sensor can measure."""
     with np.errstate(invalid="ignore"):
         return bool((np.abs(points[:, 3]) <= LARGEST_VALUE).any())
 
@@ -141,7 +141,7 @@ def channel(points: Points, name: str) -> NDArray[np.float32] | None:
 
 
 def channels(points: Points, rows: NDArray[np.int64], spec: Spec) -> NDArray[np.float32]:
-    """What the network sees of some rows, float32 (M, C): means stand in for what is missing."""
+    """The network's input channels of some rows, float32 (M, C); means replace missing values."""
     columns = []
     for name, mean in zip(spec["channels"], spec["mean"], strict=True):
         values = channel(points, name)
@@ -278,7 +278,7 @@ def sampled(points: Points, first: NDArray[np.int64]) -> tuple[float, bool]:
 def one_return(
     xyz: NDArray[np.float64], neighbours: NDArray[np.int64], distances: NDArray[np.float32]
 ) -> NDArray[np.bool_]:
-    """Which neighbours are one return with the point itself, bool (Q, k - 1)."""
+    """True for neighbours that are one return with the point itself, bool (Q, k - 1)."""
     length = np.linalg.norm(xyz, axis=1)
     own, others = length[neighbours[:, :1]], length[neighbours[:, 1:]]
     apart, farther = distances[:, 1:].astype(np.float64), others - own
@@ -307,7 +307,7 @@ def merged(
 
 
 def crowding(xyz: Points, step: float) -> NDArray[np.float32]:
-    """How many points are near each one along the curve, the nearer the more, float32 (M,)."""
+    """Number of points near each one along the curve, nearer ones weighted more, float32 (M,)."""
     x, y, z = xyz.T
     squared = np.maximum(x * x + y * y + z * z, np.float32(NEAREST_POINT**2))
     per_half = 1 / (squared * np.float32((HALF_AT * step) ** 2))
@@ -379,7 +379,7 @@ def back_projection(
     score: NDArray[np.float32],
     spec: Spec,
 ) -> NDArray[np.float32]:
-    """Scores of pixels as scores of rows, float32 (N,); of rows in no pixel it says nothing."""
+    """Scores of pixels as scores of rows, float32 (N,); undefined for rows in no pixel."""
     of_rows, projection = score[pixel], spec["view"]["way_back"]
     distance = channel(points, "range")
     assert distance is not None
@@ -389,8 +389,8 @@ def back_projection(
             of_rows[row] = vote(pixel[row], distance[row], shown, score, spec["view"]["grid"])
         elif projection == "nearest range" and distance[row] > shown[pixel[row]]:
             around = window(pixel[row], spec["view"]["grid"])
-            unlike = [abs(shown[one] - distance[row]) for _, one in around]
-            of_rows[row] = score[around[int(np.argmin(unlike))][1]]
+            differences = [abs(shown[one] - distance[row]) for _, one in around]
+            of_rows[row] = score[around[int(np.argmin(differences))][1]]
     return of_rows
 
 

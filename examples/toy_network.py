@@ -4,13 +4,13 @@ A small perceptron judges each point by its height, its intensity and how far it
 
     PYTHONPATH=examples derain fit --model toy_network.Toy --data Wads --data.root WADS
 
-What reads its checkpoints asks derain for a network named ``toy``, which is found once the package
-that holds this module names it in its ``pyproject.toml`` and is installed::
+Readers of its checkpoints look up a network named ``toy``. derain finds it once the package of this
+module names it in its ``pyproject.toml`` and is installed::
 
     [project.entry-points."derain.networks"]
     toy = "toy_network"
 
-From then on ``derain export``, ``info`` and all other commands know it as they know derain's own.
+From then on ``derain export``, ``info`` and all other commands accept it like networks of derain.
 """
 
 from collections.abc import Sequence
@@ -58,11 +58,11 @@ class Toy(SupervisedModule):
         self.adopt(spec)
 
     def view_for(self, scans: Sequence[Scan]) -> NeighbourView:
-        """The view that it sees a scan through: it needs no scans to be fitted to."""
+        """The network's view of a scan, which needs no fitting to scans."""
         return NeighbourView(self.hparams["neighbours"], self.channels)
 
     def accepts_view(self, view: View) -> bool:
-        """Whether it can take what a Spec's view gives: as many neighbours as it has inputs for."""
+        """True if it can take what a Spec's view gives: as many neighbours as it has inputs for."""
         return isinstance(view, NeighbourView) and view.neighbours == self.hparams["neighbours"]
 
     def forward(self, points: Tensor, distances: Tensor, neighbours: Tensor) -> Tensor:

@@ -118,7 +118,7 @@ def _require_candidates(model: DerainingModule) -> None:
 def _judged(
     model: DerainingModule, scan: Scan, card: DataCard
 ) -> tuple[Scan, NDArray[np.bool_], NDArray[np.bool_]]:
-    """The points of which it is known what they are, which the network calls rain, which are."""
+    """The points of known class: those that the network calls rain, and those that are rain."""
     seen = model.spec.make_view()(scan)
     with torch.inference_mode():
         logits = model(**{name: torch.from_numpy(each) for name, each in seen.inputs().items()})

@@ -71,7 +71,7 @@ def read_parameters(path: str | Path) -> tuple[str, dict[str, Any]]:
 
 
 def split_title(text: str) -> tuple[str, str]:
-    """What a method is called, and its name or file.
+    """The title of a method, and its name or file.
 
     Args:
         text: As a user writes it: the name or the file, and before it ``title=`` or nothing.
@@ -88,7 +88,7 @@ def method_names() -> list[str]:
 
 
 def method_hint(name: str) -> str:
-    """What a user should give in place of what is no method; without the full stop.
+    """The remedy for an unknown method, without the full stop.
 
     Args:
         name: What the user gave.
@@ -99,7 +99,7 @@ def method_hint(name: str) -> str:
 
 
 def is_method_name(word: str) -> bool:
-    """Whether a method has this name; other packages load only if none of derain's has it."""
+    """True if a method has this name; other packages load only if none of derain's has it."""
     return word == DEFAULT or word in FILTERS or word in METHODS
 
 
@@ -185,7 +185,7 @@ def require_one_scan(method: Method) -> None:
     if not method.window.is_one_scan:
         raise InputError(
             method.as_dict()["method"],
-            "sees the scans around the one that it judges, which are not given to it here",
+            "sees the scans around the one that it judges, which this command does not provide",
             "Use `derain run`, `derain teach` or `derain test`, which take recordings whole.",
         )
 

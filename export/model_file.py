@@ -117,7 +117,7 @@ class ModelFile:
 
 
 def with_checksum(content: bytes) -> bytes:
-    """The same file with its checksum where NO_CHECKSUM stands in its metadata."""
+    """The same file with its checksum in place of NO_CHECKSUM in its metadata."""
     place = content.rindex(NO_CHECKSUM.encode())
     digest = _checksum(content, place).encode()
     return content[:place] + digest + content[place + len(digest) :]
@@ -135,7 +135,7 @@ def number_of_weights(content: bytes) -> int:
 
 
 def _parts(message: memoryview, of_number: int) -> Iterator[memoryview]:
-    """The messages within a message that stand in one field."""
+    """The messages in one field of a message."""
     for number, value in _fields(message):
         if number == of_number and isinstance(value, memoryview):
             yield value
@@ -159,7 +159,7 @@ def _refuse_changed(path: Path, content: bytes, checksum: Any) -> None:
 
 
 def _checksum(content: bytes, place: int) -> str:
-    """SHA-256 of a file but for its checksum, which stands at a place of it."""
+    """SHA-256 of a file without the checksum at a place of it."""
     view = memoryview(content)
     digest = sha256(view[:place])
     digest.update(NO_CHECKSUM.encode())
@@ -179,7 +179,7 @@ def _metadata(content: bytes) -> str:
 
 
 def _has_external_data(content: bytes) -> bool:
-    """Whether some tensor is to be read from another file, which could be any."""
+    """True if some tensor is to be read from another file, which could be any."""
     pending = [("model", memoryview(content))]
     while pending:
         kind, message = pending.pop()

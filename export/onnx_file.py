@@ -53,7 +53,7 @@ def export(
         path: The ONNX file to write.
         calibration: Scans like those that the model will see, their intensities in its unit, to
             export it in eight bits; none exports it in float32. Each is read twice, one at a time.
-        runtime: What is to run the file, which is proved by that too where it is not onnxruntime.
+        runtime: Runtime of the file, which is proved by that too where it is not onnxruntime.
 
     Returns:
         The proof, which the file's metadata holds as well.
@@ -102,8 +102,8 @@ def with_metadata(proto: onnx.ModelProto, metadata: Mapping[str, Any], **texts: 
 
     Args:
         proto: The graph, whose metadata are replaced.
-        metadata: What derain reads of the file, JSON-able.
-        texts: What people read of it.
+        metadata: Metadata for derain, JSON-able.
+        texts: Metadata for people.
     """
     known = json.dumps({**metadata, CHECKSUM_KEY: NO_CHECKSUM})
     onnx.helper.set_model_props(proto, {METADATA_KEY: known, **texts})
@@ -196,7 +196,7 @@ def _traced(model: DerainingModule, spec: Spec) -> onnx.ModelProto:
 
 
 def _example(spec: Spec) -> ViewedScan:
-    """What the network sees of a small scan, for the exporter to follow through it.
+    """The network's inputs for a small scan, for the exporter to trace.
 
     No length may be 0 or 1, which it would take for constants, or that of another axis.
     """

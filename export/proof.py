@@ -24,7 +24,7 @@ THREADS = (1, 2)
 
 @dataclass(frozen=True)
 class Bounds:
-    """What an exported model may differ by from PyTorch on a scan.
+    """The permitted differences of an exported model from PyTorch on a scan.
 
     Attributes:
         difference: Largest difference of a logit, as a share of the scan's largest logit where
@@ -59,20 +59,20 @@ FINITE = Bounds(difference=None, flipped=None)
 
 @dataclass(frozen=True)
 class Case:
-    """How one scan came out.
+    """The comparison on one scan.
 
     Attributes:
-        name: What is hard about the scan.
+        name: The difficulty of the scan.
         points: Cells that the network judged: points, or pixels.
         threads: Threads of the runtime.
         difference: Largest difference of a logit from PyTorch's, as a share of the scan's largest
             logit where that is above 1.
         flipped: Cells on the other side of the threshold.
-        finite: Whether every logit is finite.
+        finite: True if every logit is finite.
         both: Cells with a return that both call rain.
         either: Cells with a return that one or both call rain.
-        bounds: What it may differ by.
-        runtime: What ran the exported model, with its precision where that is not float32.
+        bounds: Permitted differences.
+        runtime: Runtime of the exported model, with its precision where that is not float32.
     """
 
     name: str
@@ -88,7 +88,7 @@ class Case:
 
     @property
     def holds(self) -> bool:
-        """Whether the exported model may be trusted on this scan."""
+        """True if the exported model may be trusted on this scan."""
         near = self.bounds.difference is None or self.difference <= self.bounds.difference
         share = self.bounds.flipped
         alike = share is None or self.flipped <= max(1, share * self.points)
@@ -104,7 +104,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Proof:
-    """How an exported model compares with PyTorch on every scan tried.
+    """The comparison of an exported model with PyTorch on all scans.
 
     Attributes:
         cases: The scans, on each number of threads.
@@ -116,18 +116,18 @@ class Proof:
 
     @property
     def holds(self) -> bool:
-        """Whether every case does, and both find enough of the same rain."""
+        """True if every case does, and both find enough of the same rain."""
         other_holds = self.by_other is None or self.by_other.holds
         return other_holds and self.finds_enough and all(case.holds for case in self.cases)
 
     @property
     def least_rain_iou(self) -> float | None:
-        """What the IoU of the rain must be; None where no case bounds it."""
+        """The required IoU of the rain; None if no case bounds it."""
         return max(filter(None, (case.bounds.rain_iou for case in self.cases)), default=None)
 
     @property
     def finds_enough(self) -> bool:
-        """Whether the IoU of the rain is as great as it must be; if it is undefined, it is not."""
+        """True if the IoU of the rain is as great as it must be; if it is undefined, it is not."""
         return self.least_rain_iou is None or self.rain_iou >= self.least_rain_iou
 
     @property
@@ -197,8 +197,8 @@ def prove(
         forward: The network in evaluation mode, from raw inputs to logits.
         model: The exported file.
         scans: Names and scans.
-        bounds: What the two may differ by.
-        runtime: What runs the exported model.
+        bounds: Permitted differences.
+        runtime: Runtime of the exported model.
     """
 
     def expect(view: ViewedScan) -> NDArray[np.float32]:

@@ -1,4 +1,4 @@
-"""A model over a recording: what it makes of each scan, and the rays of the scans around it."""
+"""A model over a recording: its answers for each scan, with the rays of the scans around it."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -41,8 +41,8 @@ PlacedJudgement = tuple[Judgement, NDArray[np.float64]]
 
 UNLIKE = ScanIssue(
     "unlike the scans around it",
-    "the scans around it do not show the same from where it was taken: its pose is wrong, or it is "
-    "there twice; it is judged by itself",
+    "the scans around it do not match it at its pose: the pose is wrong, or the scan is there "
+    "twice; it is judged by itself",
 )
 
 # Of at most so many points that the model takes for solid, more rays of another scan have to end at
@@ -65,7 +65,7 @@ class RecordedDerainer(Method):
         [820]
 
     Args:
-        model: What judges a scan alone.
+        model: Model that judges a scan alone.
         past: Scans before the one that is judged.
         delay: Scans after it, which it has to wait for.
 
@@ -94,17 +94,17 @@ class RecordedDerainer(Method):
         return self.window if are_placed(recording) else None
 
     def fingerprint(self) -> str:
-        """A fingerprint of the model, and of how many scans around one it sees."""
+        """A fingerprint of the model, and of the number of scans around one that it sees."""
         seen = f"{self.model.fingerprint()} {self.window.before} {self.window.after}"
         return sha256(seen.encode()).hexdigest()[:16]
 
     @property
     def waiting(self) -> int:
-        """How many frames were pushed and are not answered for."""
+        """Number of frames that were pushed and not answered."""
         return self._frames.waiting
 
     def starts_new_recording(self, frame: Frame) -> bool:
-        """Whether a frame does not follow those that wait."""
+        """True if a frame does not follow those that wait."""
         return self.waiting > 0 and self._frames.starts_new_recording(frame)
 
     def push(
@@ -132,13 +132,13 @@ class RecordedDerainer(Method):
         self._end_recording()
 
     def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
-        """What is odd about a scan for the model, and about the scans around it."""
+        """Warnings about a scan for the model, and about the scans around it."""
         yield from self.model.issues(judgement)
         yield from self._frames.damage(judgement.scan)
         yield from self._odd.get(judgement.scan, ())
 
     def as_dict(self) -> dict[str, Any]:
-        """What commands call the model, its threshold, and how many scans around one it sees."""
+        """The model's name, its threshold, and the number of scans that it sees around one."""
         return self.model.as_dict() | {"past": self.window.before, "delay": self.window.after}
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -205,7 +205,7 @@ class RecordedDerainer(Method):
         doubtful: NDArray[np.int64],
         others: Sequence[PlacedJudgement],
     ) -> RayEvidence | None:
-        """What the rays of other scans show at the doubtful points; None where none shows the same.
+        """Evidence of the rays of other scans at the doubtful points; None if no scan matches.
 
         Args:
             scan: The scan.
@@ -244,11 +244,11 @@ class RecordedDerainer(Method):
 
 
 def _fails(scan: Scan) -> ScanIssue:
-    """What is odd about a scan beside one that the model cannot judge."""
+    """Warnings about a scan beside one that the model cannot judge."""
     name = scan.name or "a scan"
     return ScanIssue(
         "beside a scan that cannot be judged",
-        f"the model cannot judge {name}, which is beside it: the rays of that show nothing",
+        f"the model cannot judge {name}, which is beside it: the rays of that scan are not used",
     )
 
 

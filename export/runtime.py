@@ -51,17 +51,17 @@ class Derainer(Method):
         model: ONNX file written by ``derain export``; None, or ``default``, takes the model that
             comes with derain, which ``derain info default`` describes.
         threads: Threads for view and network; 0 takes every core this process may use.
-        runtime: What runs the network: ``onnxruntime``, or ``openvino``, which has to be installed
+        runtime: Runtime of the network: ``onnxruntime``, or ``openvino``, which has to be installed
             (``pip install 'derain[openvino]'``).
-        precision: What it computes in: ``float32``, or ``bf16`` with OpenVINO on a processor that
-            has it. Some scores near the threshold then come out on its other side.
+        precision: Precision of computation: ``float32``, or ``bf16`` with OpenVINO on a processor
+            that has it. Some scores near the threshold then come out on its other side.
 
     Attributes:
         path: Its file.
-        name: What commands call it: the file, or ``default``.
-        threads: How many it uses.
-        runtime: What runs the network, and its precision.
-        spec: How the model sees a scan and what it was trained on.
+        name: Its name in commands: the file, or ``default``.
+        threads: Number of threads that it uses.
+        runtime: Runtime of the network, and its precision.
+        spec: The model's view, channels and training data.
         metadata: Everything else in the file's metadata: proof, versions, licence.
 
     Raises:
@@ -166,11 +166,11 @@ class Derainer(Method):
 
     @property
     def window(self) -> Window:
-        """How many scans before and after the one that it judges its view asks for."""
+        """Number of scans that its view needs before and after the one that it judges."""
         return self.view.window
 
     def depends_on(self, recording: Sequence[Frame]) -> Window:
-        """As many scans before and after the one that it judges as its view asks for."""
+        """The scans that its view needs before and after the one that it judges."""
         return self.window
 
     def fingerprint(self) -> str:
@@ -180,11 +180,11 @@ class Derainer(Method):
 
     @property
     def waiting(self) -> int:
-        """How many frames were pushed and are not answered for: they wait for frames after them."""
+        """Number of frames that were pushed and not answered: they wait for frames after them."""
         return self._recent.waiting
 
     def starts_new_recording(self, frame: Frame) -> bool:
-        """Whether pushing a frame would let go of those that wait: it does not follow them."""
+        """True if pushing a frame would let go of those that wait: it does not follow them."""
         return self._recent.waiting > 0 and self._recent.starts_new_recording(frame)
 
     def push(
@@ -199,8 +199,8 @@ class Derainer(Method):
             >>> len(judgement.rain), derainer.waiting
             (820, 0)
 
-        A model whose view asks for scans after the one that it judges answers for an earlier frame,
-        as many frames back. One of another sequence, or after a gap, starts anew: call
+        A model whose view needs scans after the one that it judges answers for an earlier frame,
+        as many frames back. One of another sequence, or after a gap, starts a new recording: call
         :meth:`flush` before it, or the frames that still wait are let go of.
 
         Args:
@@ -247,12 +247,12 @@ class Derainer(Method):
         self._recent = RecentFrames(self.view.window)
 
     def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
-        """What is odd about a scan for the model, and whether much of it lies outside its grid."""
+        """Warnings about a scan for the model, and whether much of it lies outside its grid."""
         yield from self.spec.issues(judgement.scan)
         yield from outside_view(judgement.scan, judgement.judged, self.spec.data)
 
     def as_dict(self) -> dict[str, Any]:
-        """What commands call the model, and what it calls rain by."""
+        """The model's name, and its threshold."""
         return {"method": self.name, "threshold": self.spec.threshold}
 
     def __reduce__(self) -> tuple[type[Self], tuple[Any, ...], dict[str, Any]]:
@@ -299,7 +299,7 @@ class Derainer(Method):
                 self.path,
                 f"its scores of {scan.name or 'a scan'} are not one finite pair for each of "
                 f"{view.size:,} cells",
-                "Export the model again; if others judge the scan neither, look at its values.",
+                "Export the model again; if other models fail on the scan too, check its values.",
             )
 
 
@@ -338,7 +338,7 @@ def _refuse_other_network(session: Session, view: View, path: Path) -> None:
     if found != wanted or scores != [("float32", (2,))]:
         raise InputError(
             path,
-            f"its network takes {found} and gives {scores}, not as its Spec says {wanted} and "
+            f"its network takes {found} and returns {scores}, where its Spec requires {wanted} and "
             "two scores",
             "Export it with `derain export`.",
         )

@@ -26,9 +26,9 @@ class SharedTrials:
     off draws what it would have drawn, and searches that share a storage draw different trials.
 
     Args:
-        storage: Where the trials are kept, and other searches may keep theirs.
+        storage: Storage of the trials, shared with other searches.
         name: Of the study in the storage.
-        distributions: What is drawn, by parameter.
+        distributions: Distribution of each parameter.
         first: Parameters of the first trial.
         seed: Of the random numbers.
 
@@ -70,7 +70,7 @@ class SharedTrials:
         """A trial to compute, which no other search computes unless it is one of the last.
 
         Args:
-            most: How many trials all searches are to compute together.
+            most: Number of trials of all searches together.
 
         Returns:
             The trial, with its parameters; None where so many are complete.
@@ -81,7 +81,7 @@ class SharedTrials:
             running = [trial for trial in trials if not trial.state.is_finished()]
             if len(trials) - len(running) >= most:
                 return None
-            # At the end those of other searches, too: nobody knows whether they are still there.
+            # At the end those of other searches, too: they may have ended.
             all_are_drawn = len(trials) >= most
             for trial in running:
                 if trial.number in self._left or all_are_drawn:

@@ -1,4 +1,4 @@
-"""Where a search keeps its trials: a file, or a database that several machines reach."""
+"""Storage for the trials of a search: a file, or a database that several machines reach."""
 
 import re
 import time

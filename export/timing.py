@@ -137,7 +137,7 @@ def measure_latency(
         columns: Names of the columns of a scan that does not name them.
         threads: Threads; 0 takes every core this process may use.
         repeats: Timed runs.
-        runtime: What runs the network.
+        runtime: Runtime of the network.
 
     Raises:
         InputError: A model or scan that cannot be read.

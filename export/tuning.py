@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class LabelledNeighbourhoods:
-    """What filters see of a scan, and its truth: found once, and judged in every trial.
+    """The filters' view of a scan, and its truth: computed once, judged in every trial.
 
     Attributes:
         view: Its neighbourhoods, M points with as many neighbours as any trial looks at.
@@ -66,7 +66,7 @@ class LabelledNeighbourhoods:
 
 @dataclass(frozen=True)
 class Tuned:
-    """What tuning found.
+    """The result of tuning.
 
     Attributes:
         parameters: The parameters of the greatest IoU, by name.
@@ -91,13 +91,13 @@ def search_space(name: str) -> Mapping[str, Span]:
     space = FILTERS[name].SPACE
     if not space:
         raise InputError(
-            name, "it cannot be tuned, for it has no spans to search", "Give its class a SPACE."
+            name, "it cannot be tuned, because it has no spans to search", "Give its class a SPACE."
         )
     return space
 
 
 def neighbours_to_find(name: str) -> int:
-    """How many neighbours of every point a search for a filter's parameters needs at most.
+    """The most neighbours of a point that a search for a filter's parameters needs.
 
     Args:
         name: One of ``FILTERS``.
@@ -132,7 +132,7 @@ def tune_filter(
             labelled alike.
         trials: Trials in all, those that the storage holds already included.
         seed: Random seed of the sampler, which draws the parameters of each trial.
-        storage: Where the trials are kept, so that a later search goes on from them, and one at the
+        storage: Storage of the trials, so that a later search goes on from them, and one at the
             same time shares them; None keeps nothing.
         after_trial: Called after each trial.
 
@@ -242,7 +242,7 @@ def _agree_on_data(
 
 
 def distributions_of(name: str) -> "dict[str, optuna.distributions.BaseDistribution]":
-    """What the parameters of a filter are drawn from, by name.
+    """The distributions that the parameters of a filter are drawn from, by name.
 
     Args:
         name: One of ``FILTERS``.

@@ -1,4 +1,4 @@
-"""What every derainer shares: its Spec, and how a step of training goes."""
+"""The base class of derainers: their Spec, and the step of training."""
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
@@ -42,10 +42,10 @@ class DerainingModule(MeasuredModule):
     Attributes:
         NAME: Name of the network in a Spec and on the command line; the decorator sets it.
         VIEW: Kind of the view that it sees a scan through.
-        LOGIT_GAIN: How many times more than other networks' its logits amplify rounding.
+        LOGIT_GAIN: Amplification of rounding in its logits, relative to other networks.
         RECIPE: Names of the arguments of its training and of what is called rain. One that
             starts from another model keeps its own, and has the other's in place of all the rest.
-        INTEGER_OPERATORS: What computes in eight bits in a model that is exported so; ONNX names.
+        INTEGER_OPERATORS: Operators in eight bits of a model that is exported so; ONNX names.
         channels: Names of its input channels, as :meth:`Scan.channel` takes them.
         network: The network itself.
         card: Data card of the data it is trained or tested on, once that is agreed with them.
@@ -94,12 +94,12 @@ class DerainingModule(MeasuredModule):
 
     @property
     def has_spec(self) -> bool:
-        """Whether it has a Spec, from a training or a checkpoint."""
+        """True if it has a Spec, from a training or a checkpoint."""
         return self._spec is not None
 
     @property
     def spec(self) -> Spec:
-        """How the network is used.
+        """The Spec: how the network is used.
 
         Raises:
             InputError: It has none yet, from data or from a checkpoint.
@@ -120,7 +120,7 @@ class DerainingModule(MeasuredModule):
         """
 
     def accepts_view(self, view: View) -> bool:
-        """Whether the network can take what a Spec's view gives: by default, any of its kind."""
+        """True if the network can take what a Spec's view gives: by default, any of its kind."""
         return isinstance(view, self.VIEW)
 
     def rule_for(self, scans: Sequence[Scan]) -> Mapping[str, float]:
@@ -144,10 +144,10 @@ class DerainingModule(MeasuredModule):
         """Takes over the constants of the network's own rule from its Spec.
 
         Args:
-            rule: What stands under ``rule`` in the Spec. It is not trusted.
+            rule: The entry ``rule`` of the Spec. It is not trusted.
 
         Raises:
-            InputError: Constants that the network does not know, or some of its own missing.
+            InputError: Unknown constants, or some of its own missing.
         """
         if rule.members():
             raise rule.fault(
@@ -157,7 +157,7 @@ class DerainingModule(MeasuredModule):
 
     @abstractmethod
     def configure_optimizers(self) -> OptimizerLRScheduler:
-        """What trains it, as Lightning takes it."""
+        """The optimiser and its schedule, for Lightning."""
 
     def begin_from(self, source: "DerainingModule") -> None:
         """Takes over the weights of a trained model, to be trained on.
@@ -174,7 +174,7 @@ class DerainingModule(MeasuredModule):
         self.load_state_dict(source.state_dict())
 
     def deployed(self) -> nn.Module:
-        """The network as it is exported, in evaluation mode: from raw inputs to logits.
+        """The network for export, in evaluation mode: from raw inputs to logits.
 
         By default the module itself. What can be computed once, such as a BatchNorm that follows a
         convolution, a network may fold away here.
@@ -258,14 +258,14 @@ class DerainingModule(MeasuredModule):
             if not hasattr(self, "card"):
                 raise InputError(
                     self.NAME,
-                    "is given batches by no data module, and told nothing of them",
+                    "has no data module, and no task agreed with one",
                     "Call derain.learning.task.agree_on_task(model, data) before.",
                 )
         elif stage == "fit" or self.has_spec:
             agree_on_task(self, data, training=stage == "fit")
 
     def configure_callbacks(self) -> list[Callback]:
-        """What guards a training of any network, whoever makes the trainer."""
+        """Callbacks that guard a training of any network, with any trainer."""
         return [FiniteLoss(), Resumption()]
 
     def on_load_checkpoint(self, checkpoint: dict[str, Any]) -> None:
@@ -286,7 +286,7 @@ class DerainingModule(MeasuredModule):
         elif agreed is not None and self._trainer is not None and not _alike(self.spec, agreed):
             raise InputError(
                 "checkpoint",
-                "it sees another view than the loader makes",
+                "its view differs from that of the loader",
                 "Load the model from it before the loader is made.",
             )
 
@@ -315,5 +315,5 @@ class DerainingModule(MeasuredModule):
 
 
 def _alike(first: Spec, second: Spec) -> bool:
-    """Whether networks of two Specs see the same cells of a scan."""
+    """True if networks of two Specs see the same cells of a scan."""
     return (first.view, first.candidates) == (second.view, second.candidates)

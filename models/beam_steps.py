@@ -1,4 +1,4 @@
-"""What networks share that see neighbours in steps of the sensor's beams, and shells of range."""
+"""Shared parts of networks with neighbours in steps of the sensor's beams, and shells of range."""
 
 import torch
 from torch import Tensor
@@ -42,7 +42,7 @@ def asinh(steps: Tensor) -> Tensor:
 
 
 def farther_by(distance: Tensor, dot: Tensor, apart: Tensor) -> Tensor:
-    """How much farther neighbours are from the sensor: a difference of squares by the sum.
+    """Difference of ranges between neighbours: a difference of squares by the sum.
 
     The difference of two ranges would leave the rounding of both, which where beams lie close is no
     small part of a step.
@@ -50,7 +50,7 @@ def farther_by(distance: Tensor, dot: Tensor, apart: Tensor) -> Tensor:
     Args:
         distance: Ranges of the points, metres, float; of a shape that goes with the others'.
         dot: Products of the points with the offsets of their neighbours, float.
-        apart: How far those are from the points, metres, float.
+        apart: Their distances from the points, metres, float.
 
     Returns:
         Metres, float, in the shape of ``dot``.

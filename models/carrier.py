@@ -1,4 +1,4 @@
-"""What is taken back of answers right before the sensor: the vehicle or mast that carries it."""
+"""Lowers answers right before the sensor: the vehicle or mast that carries it."""
 
 import math
 

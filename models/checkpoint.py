@@ -26,14 +26,14 @@ from derain.models.published import LOAD_ERRORS, read_checkpoint, with_tensors
 from derain.models.registry import NETWORKS
 from derain.spec import Spec
 
-# What Lightning asks of a checkpoint that a training goes on from.
+# Entries that Lightning requires in a checkpoint to resume a training.
 TRAINING_STATE = {"optimizer_states", "lr_schedulers", "loops", "callbacks"}
 
 # Versions from 2.0 on: Lightning rewrites the checkpoints of those before, and none is derain's.
 # Source: PEP 440.
 LIGHTNING_VERSION = re.compile(r"([2-9]|[1-9]\d+)(\.\d+)+((a|b|rc|\.post|\.?dev)\d+)?(\+[\w.]+)?")
 
-# Digits of a checksum that tell one checkpoint from others.
+# Digits of a checksum that distinguish one checkpoint from others.
 CHECKSUM_DIGITS = 12
 
 
@@ -56,15 +56,15 @@ def check_resumable(path: Path) -> None:
     """Finds out whether a training can go on from a checkpoint.
 
     Raises:
-        InputError: What `load_model` raises, or a checkpoint without the state of a training.
+        InputError: The errors of `load_model`, or a checkpoint without the state of a training.
     """
     content = read_checkpoint(path)
     _model_of(content, path)
     if not content.keys() >= TRAINING_STATE:
         raise InputError(
             path,
-            "holds weights alone, no state of a training to go on from",
-            "Go on from the last.ckpt of a run, or train anew without --ckpt_path.",
+            "holds weights alone, without the state of a training to resume",
+            "Resume from the last.ckpt of a run, or train again without --ckpt_path.",
         )
 
 
@@ -72,7 +72,7 @@ def network_of_checkpoint(path: Path) -> tuple[type[DerainingModule], dict[str, 
     """The class of a checkpoint's network, by its name in the registry, and its arguments.
 
     Raises:
-        InputError: What `load_model` raises.
+        InputError: The errors of `load_model`.
     """
     content = read_checkpoint(path)
     model = _model_of(content, path)
@@ -128,7 +128,7 @@ def started(model: DerainingModule, checkpoint: Path, name: str) -> DerainingMod
 def save_model(model: DerainingModule, path: Path) -> None:
     """Writes weights and Spec as a training run would, for all that uses or measures a model.
 
-    No training goes on from it, for it holds no state of one.
+    No training can resume from it: it holds no state of one.
 
     Raises:
         InputError: An output that cannot be written.
@@ -212,15 +212,15 @@ def _model_of(content: Mapping[str, Any], path: Path) -> DerainingModule:
         raise InputError(
             path,
             "not a checkpoint of derain",
-            "Published weights become one through `derain import-weights`.",
+            "Convert published weights with `derain import-weights`.",
         )
     spec = Spec.from_dict(parameters["spec"], path)
     if spec.network not in NETWORKS:
         raise InputError(
             path,
-            f"a checkpoint of {shown(spec.network)}, a network that no installed package brings",
+            f"a checkpoint of {shown(spec.network)}, a network that no installed package provides",
             f"{did_you_mean(spec.network, NETWORKS)}Install the package that names it among the "
-            f"entry points `{NETWORKS.group}`. Known are {', '.join(NETWORKS)}.",
+            f"entry points `{NETWORKS.group}`. Available: {', '.join(NETWORKS)}.",
         )
     network, arguments = NETWORKS[spec.network], _arguments(parameters)
     defaults = {name: each.default for name, each in signature(network).parameters.items()}

@@ -1,4 +1,4 @@
-"""What the hyper-parameters of a network can be, whether a user or a file gives them."""
+"""Limits of a network's hyper-parameters, from a user or a file."""
 
 import math
 from collections.abc import Callable, Mapping

@@ -1,4 +1,4 @@
-"""How every derainer is measured and logged: in validation, test and prediction."""
+"""Measurement and logging of derainers: in validation, test and prediction."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
@@ -39,7 +39,7 @@ class MeasuredModule(lightning.LightningModule, ABC):
     """Measures a network: every scan once, on any number of processes, counts in whole numbers.
 
     Attributes:
-        LEARNS_FROM_LABELS: Whether it does; where not, none is read in its training.
+        LEARNS_FROM_LABELS: True if it does; where not, none is read in its training.
         card: Data card of what is measured, once that is agreed with the data.
         metrics: Counts of the points of the epoch, made when the data are known.
         threshold_counts: Their probabilities, counted between thresholds.
@@ -61,13 +61,13 @@ class MeasuredModule(lightning.LightningModule, ABC):
     @property
     @abstractmethod
     def spec(self) -> Spec:
-        """How the network is used."""
+        """The Spec: how the network is used."""
 
     def validation_scans(self, most: int) -> Iterator[Scan]:
         """Reads some of the validation scans, spread over all of them, as they are in their files.
 
         Args:
-            most: How many, where there are so many; none where their loader is not derain's.
+            most: The largest number; none where their loader is not derain's.
 
         Raises:
             InputError: A scan that cannot be read.
@@ -80,7 +80,7 @@ class MeasuredModule(lightning.LightningModule, ABC):
         """Logits of "not rain" and "rain" of every cell, float (M, 2), of a view's raw inputs.
 
         Args:
-            inputs: What the view gives, by the names that it has for them.
+            inputs: Inputs from the view, by name.
         """
 
     def logits_of(self, batch: Batch) -> Tensor:
@@ -179,7 +179,7 @@ class MeasuredModule(lightning.LightningModule, ABC):
             self._log_identical({"hp_metric": scores["iou"]})
 
     def _score(self, loss: Tensor) -> Tensor:
-        """What the best checkpoint is chosen by, given the loss of the validation scans."""
+        """The score that chooses the best checkpoint, given the loss of the validation scans."""
         if not self.LEARNS_FROM_LABELS:
             return -loss
         counts = self.metrics.counts().pooled()
@@ -209,7 +209,7 @@ def log_hyperparameters(loggers: Iterable[object], parameters: Mapping[str, Any]
 
     Args:
         loggers: The run's; those of TensorBoard are written to.
-        parameters: What is to stand in the table. The Spec, which is as long as a page, and names
+        parameters: Entries of the table. The Spec, which is as long as a page, and names
             that begin with an underscore are left out.
     """
     shown = {

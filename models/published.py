@@ -24,7 +24,7 @@ LOAD_ERRORS = (TypeError, ValueError, AttributeError, RuntimeError, ArithmeticEr
 
 
 class Published(ABC):
-    """A derainer whose weights somebody has published; ``derain import-weights`` asks for it."""
+    """A derainer with published weights, for ``derain import-weights``."""
 
     @classmethod
     @abstractmethod
@@ -158,7 +158,7 @@ def network_of(make: Callable[[], Network], tensors: Mapping[str, Tensor], name:
 
     Args:
         make: Makes the network.
-        tensors: What :func:`published_tensors` gave.
+        tensors: A result of :func:`published_tensors`.
         name: Name of the network, for messages.
 
     Raises:

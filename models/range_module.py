@@ -1,4 +1,4 @@
-"""What derainers on range images share: the grid they see a scan through."""
+"""The base class of derainers on range images: their grid."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -26,7 +26,7 @@ def range_view(
     Args:
         grid: ``fitted`` for one that fits the scans; or the name of a published grid, or its
             bounds, as :func:`~derain.views.spherical_grid.grid_of` takes them.
-        channels: What a pixel holds, in order.
+        channels: Channels of a pixel, in order.
         back_projection: Name of the back-projection, as :class:`RangeView` takes it.
         scans: Training scans.
 
@@ -50,7 +50,9 @@ def require_grid(grid: str | None, name: str) -> str:
         InputError: There is none.
     """
     if grid is None:
-        raise InputError(name, "weights do not say what grid they were trained on", "Give --grid.")
+        raise InputError(
+            name, "weights do not record the grid that they were trained on", "Give --grid."
+        )
     return grid
 
 

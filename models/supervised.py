@@ -1,4 +1,4 @@
-"""What derainers that learn from labels share: their loss."""
+"""The base class of derainers that learn from labels: their loss."""
 
 import sys
 from collections.abc import Sequence
@@ -50,7 +50,7 @@ class SupervisedModule(DerainingModule):
             require_rain(self._sees_rain(), self.card, "the training scans")
 
     def _sees_rain(self) -> bool:
-        """Whether a training scan has rain; those of plain loaders are not read."""
+        """True if a training scan has rain; those of plain loaders are not read."""
         data = self.trainer.datamodule  # type: ignore[attr-defined]
         if not (self.card.rain and isinstance(data, TrainingData)):
             return bool(self.card.rain)
@@ -74,7 +74,7 @@ class SupervisedModule(DerainingModule):
             self.class_weight.copy_(weights ** self.hparams.get("balance", 1.0))
 
     def candidates_for(self, card: DataCard, scans: Sequence[Scan]) -> Candidates | None:
-        """Bounds that hold as much of the training scans' rain as ``candidates`` asks for.
+        """Bounds that hold as much of the training scans' rain as ``candidates`` states.
 
         Raises:
             InputError: ``candidates`` that is no share between 0 and 1.
@@ -116,7 +116,7 @@ def one_cycle(model: SupervisedModule, final_share: float = 0.0) -> OptimizerLRS
 
     Args:
         model: The model.
-        final_share: How much of the highest learning rate is left at the end.
+        final_share: Share of the highest learning rate at the end.
 
     Source: L. N. Smith and N. Topin, "Super-Convergence: Very Fast Training of Neural Networks
         Using Large Learning Rates", 2018.

@@ -41,7 +41,7 @@ def copy_of_sources(folder: Path) -> Path:
 
 
 def built(kind: str, sources: Path, out: Path) -> Path:
-    """Builds ``wheel`` or ``sdist`` of sources, and gives the file.
+    """Builds ``wheel`` or ``sdist`` of sources, and returns the file.
 
     Raises:
         InputError: The build failed; what it said is on stderr.
@@ -106,7 +106,7 @@ def refuse_difference(ours: dict[str, bytes], theirs: dict[str, bytes]) -> None:
 
 
 def prove(wheel: Path, folder: Path) -> str:
-    """Installs a wheel in a new environment, runs it there, and gives what it said."""
+    """Installs a wheel in a new environment, runs it there, and returns its output."""
     environment = Environment(folder)
     environment.install(wheel.resolve())
     environment.run(environment.python, "-m", "pip", "check")

@@ -33,7 +33,7 @@ class Environment:
         self.run(self.python, "-m", "pip", "install", "--quiet", *requirements)
 
     def run(self, program: str | Path, *arguments: str | Path, cwd: Path | None = None) -> str:
-        """Runs a program, and gives what it prints.
+        """Runs a program, and returns its output.
 
         Args:
             program: A path, or the name of one of the environment's own programs.
@@ -53,12 +53,12 @@ class Environment:
         ).stdout
 
     def packages(self) -> dict[str, str]:
-        """What is installed besides the tools, by name, and its version."""
+        """Installed packages besides the tools, by name, and their versions."""
         found = json.loads(self.run(self.python, "-m", "pip", "list", "--format", "json"))
         return {one["name"]: one["version"] for one in found if one["name"] not in TOOLS}
 
     def megabytes(self) -> float:
-        """What the files of these packages take, in MB of 10^6 bytes."""
+        """Size of the files of these packages, in MB of 10^6 bytes."""
         (packages,) = self.folder.glob("lib/python*/site-packages")
         return sum(_size(entry) for entry in packages.iterdir() if not _is_tool(entry)) / 1e6
 

@@ -4,7 +4,7 @@
     python -m release.floors train las > floors.txt    and of some extras
     pip install -c floors.txt .
 
-What is installed so shows whether the floors are true.
+An installation with these constraints shows whether the floors are true.
 """
 
 import sys

@@ -46,7 +46,7 @@ derain.write_scan("clean.pcd", scan.take(~rain))
 
 
 def front_matter(card: ModelCard) -> dict[str, Any]:
-    """What a hub reads of a model card.
+    """The front matter of a model card, for hubs.
 
     Source: the keys, huggingface.co/docs/hub/model-cards.
     """

@@ -1,4 +1,4 @@
-"""Writes constraints.txt anew: the exact version of every package that `make` installs.
+"""Writes constraints.txt again: the exact version of every package that `make` installs.
 
     make lock
 
@@ -42,7 +42,7 @@ def lowest_python() -> str:
 
 
 def resolved(torch: str) -> list[dict[str, Any]]:
-    """What pip would install in an empty environment, as its installation report lists it.
+    """The packages that pip would install in an empty environment, by its installation report.
 
     Args:
         torch: Requirement of torch.

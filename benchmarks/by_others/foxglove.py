@@ -95,7 +95,7 @@ def make_file(path, options, scans):
 
 
 def cloud_of(scan, time):
-    """A cloud as mcap_ros2 takes it."""
+    """A cloud in the form of mcap_ros2."""
     points = np.fromfile(scan, "<f4").reshape(-1, 4)
     fields = [
         {"name": name, "offset": 4 * place, "datatype": 7, "count": 1}
@@ -148,7 +148,7 @@ def clouds(path):
 
 
 def described(path):
-    """What a file holds of its channels."""
+    """The channels of a file."""
     with path.open("rb") as file:
         return {
             (
@@ -169,7 +169,7 @@ def attached(path):
 
 
 def is_sound(path):
-    """Whether every checksum, number and place in a file is right."""
+    """True if every checksum, number and place in a file is right."""
     with path.open("rb") as file:
         one_by_one = list(NonSeekingReader(file, validate_crcs=True).iter_messages())
     with path.open("rb") as file:

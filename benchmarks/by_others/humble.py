@@ -119,12 +119,12 @@ def compare_bags(before, after, masks):
 
 
 def metadata(folder):
-    """What the metadata.yaml holds."""
+    """The content of the metadata.yaml."""
     return yaml.safe_load((folder / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
 
 
 def rows(folder, query):
-    """What a query finds in its databases."""
+    """The rows that a query finds in its databases."""
     found = []
     for name in metadata(folder)["relative_file_paths"]:
         database = sqlite3.connect(f"file:{folder / name}?mode=ro", uri=True)
@@ -144,7 +144,7 @@ def messages(folder):
 
 
 def topics_of(folder):
-    """What databases and metadata.yaml hold of topics, quality of service as values."""
+    """Topics in the databases and metadata.yaml, quality of service as values."""
     query = "SELECT name, type, serialization_format, offered_qos_profiles FROM topics"
     in_database = [(*row[:3], yaml.safe_load(row[3])) for row in rows(folder, query)]
     in_file = []
@@ -167,7 +167,7 @@ def clouds(found):
 
 
 def metadata_is_right(folder, found):
-    """Whether the metadata.yaml has all that ROS 2 asks for, and agrees with the database."""
+    """True if the metadata.yaml has all that ROS 2 requires, and agrees with the database."""
     content, times = metadata(folder), [time for _, time, _ in found]
     assert content.keys() >= KEYS, KEYS - content.keys()
     counts = {}

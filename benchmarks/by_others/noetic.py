@@ -63,7 +63,7 @@ def at(nanoseconds):
 
 
 def header(number, time, frame):
-    """What a message of a sensor begins with."""
+    """The header of a sensor's message."""
     return Header(seq=number, stamp=at(time), frame_id=frame)
 
 
@@ -130,13 +130,13 @@ def headers(path):
 
 
 def connections(path):
-    """What connections hold of publishers: definition, caller, latching."""
+    """Publishers of the connections: definition, caller, latching."""
     with rosbag.Bag(str(path)) as bag:
         return sorted(sorted(each.header.items()) for each in bag._connections.values())
 
 
 def summary(path):
-    """What `rosbag info` prints of topics and compression."""
+    """The topics and the compression that `rosbag info` prints."""
     with rosbag.Bag(str(path)) as bag:
         types, topics = bag.get_type_and_topic_info()
         counted = {name: (topic.msg_type, topic.message_count) for name, topic in topics.items()}

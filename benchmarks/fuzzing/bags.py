@@ -174,7 +174,7 @@ def _metadata() -> list[bytes]:
 
 
 def _changed(storage: Storage) -> Callable[[Random], bytes]:
-    """What makes a sound bag of a damaged cloud."""
+    """Returns a function that makes a sound bag of a damaged cloud."""
 
     def change(generator: Random) -> bytes:
         ros, messages = _ros(storage), _messages(storage)
@@ -198,7 +198,7 @@ def _with(recorded: Recorded, message: bytes) -> Recorded:
 
 
 def _lying(storage: Storage, lie: tuple[int, int, int, int]) -> bytes:
-    """A bag with a cloud that says what is not so."""
+    """A bag with a cloud whose header is wrong."""
     messages = _messages(storage)
     cloud = messages[3].message
     cloud.height, cloud.width, cloud.point_step, cloud.row_step = lie
@@ -313,7 +313,7 @@ def _hostile_metadata() -> list[Callable[[], bytes]]:
 
 
 def _chunk_of(file: bytes) -> bytes:
-    """What the first chunk of a file has, that is not compressed."""
+    """The content of the first chunk of a file, which is not compressed."""
     start = 8
     while file[start] != 6:
         start += 9 + int.from_bytes(file[start + 1 : start + 9], "little")

@@ -1,4 +1,4 @@
-"""What the fuzzer gives each format of scan files besides what derain writes in it."""
+"""Inputs of the fuzzer for each format of scan files, besides the files that derain writes."""
 
 import io
 import struct
@@ -24,7 +24,7 @@ BOMB = 1500
 
 @dataclass(frozen=True)
 class FormatInputs:
-    """What one format is given.
+    """The inputs for one format.
 
     Attributes:
         hostile: Make the files that somebody thought out to stop or fill a process.
@@ -126,7 +126,7 @@ def _laz_of_a_long_layer() -> bytes:
 
 
 def _laz_chunks() -> tuple[int, int]:
-    """Where the compressed points begin, and where their table of chunks does."""
+    """Begin of the compressed points, and of their table of chunks."""
     content = _las(".laz", "1.4")
     (begin,) = struct.unpack_from("<I", content, 96)
     (table,) = struct.unpack_from("<q", content, begin)

@@ -1,4 +1,4 @@
-"""Damage: what a file looks like after a bad disk, a bad program or a bad person."""
+"""Damages files as a bad disk, a faulty program or an attacker would."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""What is fuzzed: a reader, the inputs made for it, and what counts as a right result."""
+"""A fuzzed reader: its inputs, and the check of its results."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ class Reader:
         return self.seeds()
 
     def must_read(self, number: int) -> bool:
-        """Whether an input is undamaged."""
+        """True if an input is undamaged."""
         return number < len(self._seeds)
 
     def content(self, seed: int, number: int) -> bytes:

@@ -1,4 +1,4 @@
-"""Records of when and where scans were taken: times, poses and the calibration beside them."""
+"""Records of times and places of scans: times, poses and the calibration beside them."""
 
 from collections.abc import Callable
 from contextlib import suppress

@@ -32,7 +32,7 @@ Readers = Callable[[], Mapping[str, Reader]]
 
 @dataclass(frozen=True)
 class Outcome:
-    """What reading one input came to.
+    """The outcome of reading one input.
 
     Attributes:
         number: Of the input.
@@ -46,7 +46,7 @@ class Outcome:
 
     @property
     def is_finding(self) -> bool:
-        """Whether something is wrong."""
+        """True if something is wrong."""
         return self.verdict not in (RIGHT, REFUSED)
 
 
@@ -90,7 +90,7 @@ def _verdict(reader: Reader, path: Path, must_read: bool) -> str:
 
 
 class Worker:
-    """A process that judges inputs, and is started anew where one has ended it.
+    """A process that judges inputs, and is started again if one has ended it.
 
     Args:
         seed: Of the whole run.
@@ -146,7 +146,7 @@ class Worker:
 
 
 def _serve(connection: Connection, seed: int, folder: Path, readers: Readers) -> None:
-    """Judges what it is told to; what libraries print goes to a file."""
+    """Judges inputs on request; output of libraries goes to a file."""
     warnings.simplefilter("ignore")
     errors = os.open(folder / "stderr", os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
     os.dup2(errors, sys.stderr.fileno())
@@ -162,7 +162,7 @@ def _serve(connection: Connection, seed: int, folder: Path, readers: Readers) ->
 
 @cache
 def _has_peaks() -> bool:
-    """Whether the system says how much a process had at most, and can be told to forget it."""
+    """True if the system reports a process's peak memory and can reset it."""
     return os.access("/proc/self/clear_refs", os.W_OK)
 
 
@@ -180,7 +180,7 @@ def _resident(process: int | None) -> int:
 
 
 def _status(process: str, key: str) -> int:
-    """A line of what Linux knows of a process, MB; 0 where it is gone."""
+    """A line of Linux's status of a process, MB; 0 if it has ended."""
     with suppress(OSError):
         for line in Path(f"/proc/{process}/status").read_text().splitlines():
             if line.startswith(key):

@@ -13,11 +13,11 @@ LEARNT_MARK = " †"
 
 @dataclass(frozen=True)
 class Cell:
-    """What one method has in one column.
+    """The entry of one method in one column.
 
     Attributes:
         value: An IoU, a share, milliseconds or kilobytes.
-        learnt: Whether the method was trained on some of the column's scans.
+        learnt: True if the method was trained on some of the column's scans.
         counts: Points behind the value, by what they are and were called.
     """
 
@@ -48,7 +48,7 @@ class Column:
         return self.title if self.unit == "IoU" else f"{self.title}, {self.unit}"
 
     def text(self, method: str) -> str:
-        """What a method has in it, as written in the table."""
+        """A method's entry as text of the table."""
         cell = self.cells.get(method)
         if cell is None or math.isnan(cell.value):
             return "-"

@@ -28,7 +28,7 @@ Found = TypeVar("Found")
 
 @dataclass
 class LeftOut:
-    """What is not in the table.
+    """Entries that are missing in the table.
 
     Attributes:
         reasons: Why, by what it is.
@@ -37,7 +37,7 @@ class LeftOut:
     reasons: dict[str, str] = field(default_factory=dict)
 
     def unless_found(self, what: str, find: Callable[[], Found]) -> Found | None:
-        """What is found; None, and a note of the reason, where it is refused."""
+        """The input if it is found; None, and a note of the reason, if it is refused."""
         try:
             return find()
         except InputError as error:

@@ -36,7 +36,7 @@ MOST = "worst of the clean scans"
 
 @dataclass
 class Measurement:
-    """Measures what a plan asks for, and notes what cannot be.
+    """Measures the entries of a plan, and notes those that cannot be measured.
 
     Attributes:
         plan: The rows and columns.
@@ -79,7 +79,7 @@ class Measurement:
     def _positions(
         self, title: str, data: LabelledData, finder: DataFinder
     ) -> Iterator[BenchEntry]:
-        """What has learnt places alone, of other scans of the same data."""
+        """The baseline of places alone, fitted to other scans of the same data."""
         for method, row in self.plan.methods.items():
             if row.is_position and not data.taken:
                 find = partial(finder.of_places, data)
@@ -108,7 +108,7 @@ class Measurement:
         yield Column(title, "IoU", cells, about)
 
     def _learnt(self, row: BenchEntry, column: str, found: LabelledFrames) -> bool:
-        """Whether a method was trained on scans of a column, by its record or by the plan."""
+        """True if a method was trained on scans of a column, by its record or by the plan."""
         spec = row.spec_or_filter
         recorded = isinstance(spec, Spec) and training_overlap(
             row.title, spec, found.card, found.frames
@@ -184,7 +184,7 @@ def _share(called: int, points: int) -> Cell:
 
 
 def factor_for(spec_or_filter: object, scan: Scan) -> float:
-    """What takes a scan's intensities to the unit of a method; 1 where either has none.
+    """The factor from a scan's intensities to the unit of a method; 1 if either has none.
 
     Args:
         spec_or_filter: What the method judges by: a filter, or the Spec of a model.

@@ -1,4 +1,4 @@
-"""What a table across sensors is made of, as its YAML file says it."""
+"""The plan of a table across sensors, read from its YAML file."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
@@ -10,7 +10,7 @@ import yaml
 
 @dataclass(frozen=True)
 class Row:
-    """A row: a method, named by what makes it.
+    """A row: a method, named by its file or settings.
 
     Attributes:
         method: As ``derain bench`` has it: a model, a YAML of parameters, a filter, a baseline.
@@ -28,7 +28,7 @@ class Row:
 
     @property
     def is_position(self) -> bool:
-        """Whether it is learnt anew for each column, from other scans of the same data."""
+        """True if it is learnt anew for each column, from other scans of the same data."""
         return self.method == "position"
 
 

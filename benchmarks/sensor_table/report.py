@@ -23,7 +23,7 @@ so. ms: from file to mask, the median, each method alone in a process. -: not me
 
 
 def add_places(parser: ArgumentParser) -> None:
-    """Declares the arguments that say where things are."""
+    """Declares the arguments for the places of files."""
     parser.add_argument("--shared", type=Path, default=Path("../shared"), help="scans, weights")
     parser.add_argument(
         "--work", type=Path, default=Path("runs/across_sensors"), help="what is made on the way"

@@ -58,7 +58,7 @@ class TaughtScan:
         scan: Its file.
         sequence: Name of its sequence.
         number: Its number in the sequence, from 0.
-        part: Whether it is for training or held out.
+        part: True if it is for training or held out.
     """
 
     key: str
@@ -77,7 +77,7 @@ class Manifest:
         scans: The scans, in time order, one sequence after the other.
         columns: Names of the columns of files that do not name them.
         intensity_scale: Factor from the scans' intensities to the unit that the teacher read.
-        finished: Whether all labels are there.
+        finished: True if all labels are there.
     """
 
     teacher: Mapping[str, Any]
@@ -192,7 +192,7 @@ def parts_of(frames: Sequence[Frame]) -> Iterator[TaughtPart]:
 
 
 def is_taught(root: Path) -> bool:
-    """Whether a folder holds taught labels, complete or not."""
+    """True if a folder holds taught labels, complete or not."""
     path, head = root / TAUGHT_MANIFEST, f"made_by: {TEACHING}\n".encode()
     if not is_file(path):
         return False
@@ -206,7 +206,7 @@ def label_path(root: Path, key: str) -> Path:
 
 
 def _is_later(frame: Frame, other: Frame) -> bool:
-    """Whether a frame is later in the same sequence; two sequences may have one name."""
+    """True if a frame is later in the same sequence; two sequences may have one name."""
     return frame.sequence == other.sequence and frame.number > other.number
 
 

@@ -49,7 +49,7 @@ class Rectangle:
     heading: float
 
     def relative(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Where points lie in the rectangle's frame: ahead and left of its centre.
+        """Positions of points in the rectangle's frame: ahead and left of its centre.
 
         Args:
             points: float64 (..., 2), metres.
@@ -62,7 +62,7 @@ class Rectangle:
         return np.stack([cosine * x + sine * y, cosine * y - sine * x], axis=-1)
 
     def contains(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Which points, float64 (N, 2), metres, lie inside or on the outline; bool (N,)."""
+        """True for points, float64 (N, 2), metres, inside or on the outline; bool (N,)."""
         ahead, left = self.relative(points).T
         length, width = self.size
         inside: NDArray[np.bool_] = (np.abs(ahead) <= length / 2) & (np.abs(left) <= width / 2)
@@ -83,7 +83,7 @@ class Rectangle:
 
 @dataclass(frozen=True)
 class Correction:
-    """How a box differs in one sequence.
+    """Changes of a box in one sequence.
 
     Attributes:
         shift: Shift of its centre along x, y and z, metres.
@@ -118,7 +118,7 @@ class Box:
         return Rectangle(self.centre[:2], self.size[:2], self.heading)
 
     def contains(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Which points lie in the box or on its faces.
+        """True for points that lie in the box or on its faces.
 
         Args:
             points: x, y and z, float64 (N, 3), metres, sensor frame.
@@ -174,7 +174,7 @@ class Scene:
 
 
 def inside(polygon: Polygon, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which points lie in a polygon, seen from above.
+    """True for points that lie in a polygon, seen from above.
 
     Args:
         polygon: Corners x, y in order, metres, sensor frame.
@@ -208,7 +208,7 @@ def read_scene(path: Path) -> Scene:
                 raise InputError(
                     f"{path}: corrections.{sequence}.boxes.{name}",
                     "there is no such box",
-                    f"Known are {', '.join(scene.boxes)}.",
+                    f"Available: {', '.join(scene.boxes)}.",
                 )
     return scene
 

@@ -65,7 +65,7 @@ class LabelledScan:
         truth: Its points by their own labels, as
             :attr:`derain.evaluation.counts.RainCounts.cells` for each title of a
             :class:`TruthRecord`; None where they are not measured.
-        issues: What is odd about it.
+        issues: Warnings about it.
         error: Why it has no labels; None where it has.
     """
 
@@ -83,7 +83,7 @@ class LabelledScan:
 
     @property
     def is_known(self) -> bool:
-        """Whether anything is known of it."""
+        """True if anything is known of it."""
         return bool(self.answers.table[:, :NOT_KNOWN].any())
 
     def to_json(self) -> dict[str, Any]:
@@ -99,10 +99,10 @@ class LabelledScan:
 
 @dataclass(frozen=True)
 class Labelling(UnitJudging[LabelledScan]):
-    """Labels the scans of one unit after the other, also those of which nothing is known.
+    """Labels the scans of one unit after the other, also those without any known point.
 
     Attributes:
-        folder: Where the labels go, as of :func:`derain.annotation.manifest.label_path`.
+        folder: Folder for the labels, as of :func:`derain.annotation.manifest.label_path`.
         card: Data card of the scans, whose own labels measure the method's; None where there is
             none.
     """
@@ -118,7 +118,7 @@ class Labelling(UnitJudging[LabelledScan]):
             yield replace(labelled, issues=issues)
 
     def look(self) -> IsThere[FrameUnit, LabelledScan]:
-        """Whether all scans of a unit have labels."""
+        """True if all scans of a unit have labels."""
         return lambda unit, labelled: all(
             label_path(self.folder, frame.key).exists() for frame in unit.frames
         )
@@ -186,7 +186,7 @@ def teach(
         card: Data card of the scans, from which the new one takes licence and unit.
         guard: Surrounds the error of each scan; a scan whose error it suppresses gets no labels.
         watch: Called for each scan as soon as it is judged, in order.
-        division: How the scans are divided into units. Where there are more scans than a block has,
+        division: Division of the scans into units. Where there are more scans than a block has,
             a record of each unit is kept in the folder, by which a teaching that was stopped goes
             on. None keeps no records.
         executor: Does the units: an executor of :mod:`concurrent.futures` or the like, whose
@@ -231,7 +231,7 @@ def teach(
 
 
 def _known(scans: Iterator[LabelledScan], total: int, guard: Guard, watch: Watch) -> list[Frame]:
-    """The frames of which something is known, after all scans are labelled."""
+    """The frames with known points, after all scans are labelled."""
     frames: list[Frame] = []
     for scan in tqdm(scans, total=total, desc="teaching", unit="scan", disable=None):
         if scan.error is not None:
@@ -254,8 +254,8 @@ def _finish(work: Labelling, out: Path, known: Sequence[Frame]) -> Manifest:
     if not frames:
         raise InputError(
             out,
-            "nothing is written, for of no point it is known whether it is rain",
-            "See whether the method suits the scans: some need several of one recording.",
+            "nothing is written, because the method is sure of no point",
+            "Check that the method suits the scans: some need several scans of one recording.",
         )
     manifest = Manifest(
         work.method.as_dict(),
@@ -308,7 +308,7 @@ def refuse_to_overwrite(out: Path, source: Source) -> None:
     for frame in source:
         if not isinstance(frame, FileFrame):
             raise InputError(
-                frame.name, "is in no file, where it could be found again", "Write it to one."
+                frame.name, "is not in a file, and cannot be found again", "Write it to one."
             )
     # Refuses the places where the scans' own labels are or would be searched for.
     for sink in (FolderSink(out / LABELS, again=False), LabelSink(out / LABELS, again=False)):
@@ -318,7 +318,9 @@ def refuse_to_overwrite(out: Path, source: Source) -> None:
     for name in (TAUGHT_MANIFEST, CARD, LABELS):
         if os.path.lexists(out / name):
             raise InputError(
-                out / name, "is there already, and no teacher's", "Give --out another folder."
+                out / name,
+                "exists, and `derain teach` did not write it",
+                "Give --out another folder.",
             )
 
 

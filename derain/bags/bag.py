@@ -26,9 +26,9 @@ class Message(NamedTuple):
 
     Attributes:
         connection: The reader's connection, which describes its topic and publisher.
-        time: When it was recorded, nanoseconds.
+        time: Time of recording, nanoseconds.
         data: Its bytes.
-        published: When it was published, nanoseconds; 0 in storages other than MCAP.
+        published: Time of publication, nanoseconds; 0 in storages other than MCAP.
         sequence: Its number, as the publisher counts; 0 in storages other than MCAP.
     """
 
@@ -52,7 +52,7 @@ class Bag:
 
     @property
     def is_ros1(self) -> bool:
-        """Whether ROS 1 recorded it."""
+        """True if ROS 1 recorded it."""
         return self.path.suffix.lower() == ROS1_SUFFIX and not os.path.isdir(self.path)
 
     @cached_property
@@ -67,7 +67,7 @@ class Bag:
 
     @cached_property
     def storage(self) -> str:
-        """How it is stored: ``ros1``, ``mcap`` or ``sqlite3``.
+        """Its storage: ``ros1``, ``mcap`` or ``sqlite3``.
 
         Raises:
             InputError: As for :attr:`metadata`.

@@ -21,7 +21,7 @@ class BagCopy:
     Args:
         bag: The bag.
         topic: Its topic of clouds.
-        folder: Where the copy is written; the caller removes an incomplete one.
+        folder: Path of the copy; the caller removes an incomplete one.
 
     Raises:
         InputError: A bag that cannot be read, or a copy that cannot be written.

@@ -39,7 +39,7 @@ class CloudMessage:
         head: Its bytes up to the cloud: the header with stamp and frame.
         cloud: The cloud.
         tail: Its bytes after the cloud.
-        stamp: When the cloud was taken, nanoseconds; 0 where the driver writes none.
+        stamp: Time of the cloud, nanoseconds; 0 where the driver writes none.
     """
 
     encoding: str
@@ -105,7 +105,7 @@ class CloudMessage:
 
 
 def stamp_of(message: bytes, encoding: str) -> int:
-    """When the cloud of a message was taken, nanoseconds, without reading the cloud.
+    """Time at which the cloud of a message was taken, nanoseconds, without reading the cloud.
 
     Args:
         message: The bytes of a message that begins with a header.
@@ -115,7 +115,7 @@ def stamp_of(message: bytes, encoding: str) -> int:
         ValueError: Bytes that are no such message.
     """
     if encoding == CDR and message[:2] != PLAIN_CDR:
-        raise ValueError(f"it begins with {bytes(message[:4]).hex()}, which is no plain CDR")
+        raise ValueError(f"it begins with {bytes(message[:4]).hex()}, which is not plain CDR")
     start = STAMP_AT[encoding]
     if len(message) < start + 8:
         raise ValueError("the message ends too early")
@@ -147,7 +147,7 @@ class _Reader:
         text = bytes(self.take(self.number("I")))
         if self.encoding == CDR and text:
             if text[-1]:
-                raise ValueError("a text in it does not end as CDR has it")
+                raise ValueError("a text in it does not end as CDR requires")
             text = text[:-1]
         return text.decode(*TEXT)
 

@@ -39,7 +39,7 @@ class CloudTopic:
         self._forget()
 
     def _forget(self) -> None:
-        """Begins anew, as another process does."""
+        """Starts again, as another process does."""
         self._lock = threading.Lock()
         self._process = os.getpid()
         self._messages: Iterator[Message] = iter(())  # first, so that it ends before the bag closes
@@ -91,7 +91,7 @@ class CloudTopic:
         return cloud
 
     def seconds(self, number: int) -> float:
-        """When one of the clouds was taken, seconds.
+        """Time at which one of the clouds was taken, seconds.
 
         Raises:
             InputError: As for :meth:`message`, or a damaged cloud.
@@ -124,7 +124,7 @@ class CloudTopic:
         return first
 
     def _times_of_all(self) -> NDArray[np.int64]:
-        """When the clouds were recorded and taken, nanoseconds, (M, 2).
+        """Time at which the clouds were recorded and taken, nanoseconds, (M, 2).
 
         The first call reads through the topic.
         """

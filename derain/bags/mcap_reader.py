@@ -26,8 +26,8 @@ class McapConnection:
     Attributes:
         topic: Name of the topic.
         msgtype: Type of its messages, such as ``sensor_msgs/msg/PointCloud2``.
-        msgcount: How many messages there are, over all files.
-        encoding: How they are written, such as ``cdr``.
+        msgcount: Number of messages, over all files.
+        encoding: Name of the encoding, such as ``cdr``.
         notes: Names and values of the channel's metadata, such as quality of service.
         schema: Name, encoding and content of the definition of the type; None without one.
     """
@@ -41,7 +41,7 @@ class McapConnection:
 
 
 class ChunkPlace(NamedTuple):
-    """Where a chunk is.
+    """The place of a chunk.
 
     Attributes:
         start: The earliest time in it, nanoseconds.
@@ -73,7 +73,7 @@ class McapFile:
         counts: Number of messages of each channel.
         start: The earliest time of a message, nanoseconds.
         end: The latest.
-        chunks: Where chunks are.
+        chunks: Places of the chunks.
 
     Raises:
         ValueError: A damaged file.
@@ -102,7 +102,7 @@ class McapFile:
         for number, channel in self.channels.items():
             schema = self.schemas.get(channel.schema_id)
             if schema is None and channel.schema_id:
-                raise ValueError(f"{channel.topic} has a type that is defined nowhere")
+                raise ValueError(f"{channel.topic} has an undefined type")
             name = "" if schema is None else schema.name
             found[number] = McapConnection(
                 channel.topic,
@@ -146,7 +146,7 @@ class McapFile:
             elif kind == Opcode.DATA_END:
                 self.records.check_data(offset)
         if chunks != {chunk.offset for chunk in self.chunks}:
-            raise ValueError("its summary names other chunks than there are")
+            raise ValueError("its summary does not match its chunks")
         if messages != len(self._times):
             raise ValueError(f"its summary lacks {messages:,} messages that are in no chunk")
 
@@ -254,7 +254,7 @@ class McapFile:
                     raise _undefined(message)
 
     def _are_all(self, channels: Container[int]) -> bool:
-        """Whether all channels are of interest, so that no message may be left out."""
+        """True if all channels are of interest, so that no message may be left out."""
         return all(number in channels for number in self.channels)
 
 
@@ -288,7 +288,7 @@ class McapReader:
 
     @property
     def start_time(self) -> int:
-        """When the first message was recorded, nanoseconds; 0 where there is none."""
+        """Time at which the first message was recorded, nanoseconds; 0 where there is none."""
         return min((file.start for file in self.files if file.counts.total()), default=0)
 
     @property
@@ -366,7 +366,7 @@ def _place_of(
 
 
 def _undefined(message: Message) -> ValueError:
-    return ValueError(f"a message is of channel {message.channel_id}, which nothing defines")
+    return ValueError(f"a message is of channel {message.channel_id}, which is not defined")
 
 
 def _long_name(type_: str) -> str:

@@ -47,7 +47,7 @@ FOOTER_SIZE = 20
 
 
 class Place(NamedTuple):
-    """Where a record is.
+    """The place of a record.
 
     Attributes:
         kind: Its kind.
@@ -67,7 +67,7 @@ class McapRecords:
         file: The file, open.
 
     Attributes:
-        profile: What the header calls the kind of recording, such as ``ros2``.
+        profile: The header's name for the kind of recording, such as ``ros2``.
         data: Bytes from the first to the last of the data.
         summary: Bytes of the summary, which follows them; empty where there is none.
 
@@ -154,9 +154,9 @@ class McapRecords:
         end = self._size - len(MAGIC)
         footer_at = end - FOOTER_SIZE - HEAD.size
         if self._bytes(0, len(MAGIC)) != MAGIC:
-            raise ValueError("it does not begin as MCAP does")
+            raise ValueError("it does not begin with the magic bytes of MCAP")
         if footer_at < len(MAGIC) or self._bytes(end, len(MAGIC)) != MAGIC:
-            raise ValueError("it does not end as MCAP does")
+            raise ValueError("it does not end with the magic bytes of MCAP")
         content = self._body(footer_at, Opcode.FOOTER)
         if len(content) != FOOTER_SIZE:
             raise ValueError("its footer is damaged")
@@ -166,7 +166,7 @@ class McapRecords:
         begin = len(MAGIC) + HEAD.size + len(header)
         summary = footer.summary_start or footer_at
         if not begin <= summary <= footer_at:
-            raise ValueError("its summary is out of place")
+            raise ValueError("its summary is in the wrong place")
         self.data = begin, summary
         self.summary = summary, footer_at
         self._summary_crc = footer.summary_crc

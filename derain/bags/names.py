@@ -47,7 +47,7 @@ def bags_at(path: Path) -> list[Path]:
 
 
 def is_bag(path: Path) -> bool:
-    """Whether something is a bag: a file by its suffix, a folder by what it holds.
+    """True if something is a bag: a file by its suffix, a folder by what it holds.
 
     Raises:
         InputError: A file of ROS 2 that is compressed as a whole, or a bag of ROS 1 whose recording
@@ -92,7 +92,7 @@ def within(paths: Iterable[Path], topic: str | None) -> list[Path]:
     """The same paths, where a topic is appended to those of bags.
 
     Args:
-        paths: Bags and whatever else.
+        paths: Bags and any other paths.
         topic: The topic; None leaves the paths as they are.
 
     Raises:
@@ -103,7 +103,7 @@ def within(paths: Iterable[Path], topic: str | None) -> list[Path]:
         return paths
     found = {path: bags_at(path) for path in paths}
     if not any(found.values()):
-        raise InputError("--topic", "no bag is named that could have it", "Leave it out.")
+        raise InputError("--topic", "no bag is named to which it could apply", "Leave it out.")
     return [
         each
         for path in paths

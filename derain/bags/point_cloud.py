@@ -63,12 +63,12 @@ class PointCloud:
     Attributes:
         height: Rows of an organised cloud; 1 of any other.
         width: Points in a row.
-        fields: What the bytes of a point mean, in the order of the message.
-        is_bigendian: Whether numbers are in big-endian byte order.
+        fields: Fields of a point, in the order of the message.
+        is_bigendian: True if numbers are in big-endian byte order.
         point_step: Bytes of a point.
         row_step: Bytes of a row, with padding at its end if it has any.
         data: Bytes of all rows.
-        is_dense: Whether all points are finite, as the driver states.
+        is_dense: True if all points are finite, as the driver states.
 
     Raises:
         ValueError: Fields, steps and bytes that contradict each other.
@@ -115,7 +115,7 @@ class PointCloud:
 
     @property
     def is_organised(self) -> bool:
-        """Whether its rows are rows of the sensor."""
+        """True if its rows are rows of the sensor."""
         return self.height > 1
 
     def columns(self) -> dict[str, NDArray[Any]]:
@@ -147,7 +147,7 @@ class PointCloud:
         Where all of an unorganised cloud are taken, it stays as it is.
 
         Args:
-            rows: Which points, bool (N,).
+            rows: Mask of points, bool (N,).
         """
         if rows.all():
             return self
@@ -165,7 +165,7 @@ class PointCloud:
         """The same cloud in its shape, where x, y and z of some points are no numbers.
 
         Args:
-            rows: Which points, bool (N,).
+            rows: Mask of points, bool (N,).
 
         Raises:
             ValueError: No x, y and z that can hold what is no number.

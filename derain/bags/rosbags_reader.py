@@ -1,4 +1,4 @@
-"""Opens bags of ROS 1 and SQLite by the library, with bounds on what it unpacks and reads."""
+"""Opens bags of ROS 1 and SQLite with rosbags, with bounds on the sizes that it reads."""
 
 import os
 from collections import Counter
@@ -35,7 +35,7 @@ def rosbags_reader(path: Path, is_ros1: bool) -> Iterator[Any]:
 
     Args:
         path: A file of ROS 1 or of SQLite, or a folder of ROS 2 with files of SQLite.
-        is_ros1: Whether it is a file of ROS 1.
+        is_ros1: True if it is a file of ROS 1.
     """
     if is_ros1:
         reader = ROSBAGS.load(path, "rosbag1").Reader(path)
@@ -62,7 +62,7 @@ def other_tables(reader: Any) -> list[str]:
     """Names of tables in the databases of a bag that are none of ROS 2.
 
     Args:
-        reader: What :func:`rosbags_reader` lends.
+        reader: A reader of :func:`rosbags_reader`.
     """
     tables = "SELECT name FROM sqlite_schema WHERE type = 'table' AND name NOT LIKE 'sqlite_%'"
     found = {name for each in _databases(reader) for (name,) in each.dbconn.execute(tables)}
@@ -73,7 +73,7 @@ def stored_messages(reader: Any) -> int:
     """Number of messages in the files of a bag, also of topics that it does not list.
 
     Args:
-        reader: What :func:`rosbags_reader` lends.
+        reader: A reader of :func:`rosbags_reader`.
 
     Raises:
         ValueError: A bag of ROS 1 with chunks or messages that its index does not name.
@@ -98,8 +98,8 @@ class ChunkUnpacker:
     """Unpacks a chunk of ROS 1.
 
     Attributes:
-        compression: How it is compressed.
-        messages: How many messages the index has of it.
+        compression: Name of the compression.
+        messages: Number of its messages in the index.
     """
 
     compression: str

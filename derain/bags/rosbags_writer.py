@@ -21,7 +21,7 @@ class RosbagsWriter:
     Args:
         bag: The other bag.
         reader: The library's reader of it, open.
-        path: Where the bag is written: a file of ROS 1, a folder of ROS 2.
+        path: Path of the written bag: a file of ROS 1, a folder of ROS 2.
     """
 
     def __init__(self, bag: Bag, reader: Any, path: Path) -> None:
@@ -50,7 +50,7 @@ class RosbagsWriter:
         """Writes a message.
 
         Args:
-            connection: What :meth:`connection` gave.
+            connection: A result of :meth:`connection`.
             like: The message of the other bag whose time it gets.
             data: Its bytes.
         """
@@ -113,7 +113,7 @@ def _ros1(reader: Any, path: Path) -> Any:
 def _lz4_of_ros1(data: bytes) -> bytes:
     """Compresses a chunk in the way that ROS 1 can read.
 
-    Source: roslz4, which refuses linked blocks, wants a checksum, and knows no size of the content.
+    Source: roslz4, which refuses linked blocks and a size of the content, and requires a checksum.
     """
     packed: bytes = LZ4.load("bags", "frame").compress(
         data, block_linked=False, content_checksum=True, store_size=False

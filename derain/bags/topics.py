@@ -40,8 +40,8 @@ class Topic:
     Attributes:
         name: Its name.
         type: Type of its messages.
-        messages: How many there are, by the bag's index.
-        encoding: How they are written: ``ros1`` or ``cdr``.
+        messages: Their number, by the bag's index.
+        encoding: Name of the encoding: ``ros1`` or ``cdr``.
     """
 
     name: str
@@ -50,7 +50,7 @@ class Topic:
     encoding: str
 
     def has(self, connection: Any) -> bool:
-        """Whether a reader's connection belongs to it; several publishers share a topic."""
+        """True if a reader's connection belongs to it; several publishers share a topic."""
         return bool(connection.topic == self.name and connection.msgtype == self.type)
 
     def __str__(self) -> str:
@@ -88,7 +88,7 @@ def cloud_topic(bag: Path, topics: Sequence[Topic], name: str = "") -> Topic:
 
 
 def decoder_of(message_type: str) -> str | None:
-    """What makes PointCloud2 of a type of message; None where that is not known.
+    """The node that converts a type of message to PointCloud2; None if it is not known.
 
     Args:
         message_type: Its type, such as ``velodyne_msgs/msg/VelodyneScan``.

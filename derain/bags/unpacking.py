@@ -1,7 +1,6 @@
 """Unpacks compressed chunks, messages and files of bags, up to a size.
 
-A few kilobytes may unpack to more than there is memory, and the libraries that read bags unpack
-whatever they find.
+A few kilobytes may unpack to more than the memory, and the libraries that read bags have no bound.
 """
 
 import atexit
@@ -108,7 +107,7 @@ def _unpack_file(source: Path, target: Path) -> None:
                 while portion := reader.read(PORTION):
                     if shutil.disk_usage(target.parent).free < LEFT + len(portion):
                         raise ValueError(
-                            f"{source.name} unpacks to more than there is room for in "
+                            f"{source.name} unpacks to more than the free space in "
                             f"{target.parent.parent}"
                         )
                     unpacked.write(portion)

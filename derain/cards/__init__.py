@@ -1,1 +1,1 @@
-"""Data cards, one YAML a data set: what must be known of it to train and to measure."""
+"""Data cards, one YAML a data set: its classes, units, statistics and layout."""

@@ -1,4 +1,4 @@
-"""Data cards: what must be known of a data set to train on it and to use what was trained."""
+"""Data cards: descriptions of data sets, for training on them and for using trained models."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -26,7 +26,7 @@ CHANNELS_OF_STATISTICS = ("x", "y", "z", "intensity")
 
 @dataclass(frozen=True)
 class DataCard:
-    """What must be known of a data set.
+    """The description of a data set.
 
     Example:
         >>> card = DataCard("my garage", classes={0: "wall", 1: "spray"}, rain=(1,))
@@ -38,7 +38,7 @@ class DataCard:
         name: Name of the data set, for tables and models.
         classes: Names of its semantic classes, by id.
         rain: Ids of the classes that are to be removed; none where the data are clean.
-        unknown: Ids of the classes of which it is not known whether they are rain: neither trained
+        unknown: Ids of the classes that may or may not be rain: neither trained
             on nor measured by.
         licence: Licence of the data.
         intensity_unit: Unit or span of its intensities, such as ``0..255``.
@@ -47,12 +47,12 @@ class DataCard:
         range: Mean and standard deviation of range in metres; None if not known.
         extra: Mean and standard deviation of further channels, by name, such as ``doppler``.
         rain_share: Share of rain among the training points; None if not known.
-        simulated: Whether its rain or snow fell in a computer; scores on it are labelled so.
-        deduplicate: Whether results on it count points at one position once, as those of a sensor
+        simulated: True if its rain or snow is simulated; scores on it are labelled so.
+        deduplicate: True if results on it count points at one position once, as those of a sensor
             that writes many points twice are published.
         split: Sequences of ``train``, ``validation`` and ``test``; empty without an official split.
-        layout: Where its scans and labels lie.
-        auto_detect: What may be concluded where folders have the names of ``layout`` and nobody
+        layout: Layout of its scans and labels.
+        auto_detect: Conclusion if folders have the names of ``layout`` and nobody
             names a card: ``nothing``; ``classes``, the names of the classes; or ``rain``, all that
             the card says.
         parts: Ids of the classes of each of several data sets that it is the card of, by name; no
@@ -116,7 +116,7 @@ class DataCard:
         return self.intensity_unit if channel == "intensity" else UNITS.get(channel, "not stated")
 
     def rain_of(self, scan: Scan) -> NDArray[np.bool_]:
-        """Which points of a labelled scan are rain, bool (N,).
+        """True for points of a labelled scan that are rain, bool (N,).
 
         Raises:
             InputError: A scan without labels.
@@ -124,7 +124,7 @@ class DataCard:
         return self._of_classes(scan, self.rain)
 
     def unknown_of(self, scan: Scan) -> NDArray[np.bool_]:
-        """Of which points of a labelled scan it is not known whether they are rain, bool (N,).
+        """True for points of a labelled scan whose class is unknown, bool (N,).
 
         Raises:
             InputError: A scan without labels.
@@ -132,7 +132,7 @@ class DataCard:
         return self._of_classes(scan, self.unknown)
 
     def known_points(self, scan: Scan) -> tuple[Scan, NDArray[np.bool_]]:
-        """The points of a labelled scan of which it is known whether they are rain.
+        """The points of a labelled scan whose class is known.
 
         Returns:
             The scan of those M points, and which of them are rain, bool (M,).
@@ -228,7 +228,7 @@ def _card(document: Entry) -> DataCard:
             raise members[key].fault(
                 f"{shown(list(ids))} are not all ids of classes"
                 f"{' that are not rain' if key == 'unknown' else ''}",
-                "Name ids that stand under classes.",
+                "Name ids that are listed under classes.",
             )
     return card
 

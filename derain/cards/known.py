@@ -31,8 +31,8 @@ def card_by_folders(layout: Layout, least: AutoDetect) -> DataCard | None:
     """The packaged data card that follows from folders of a layout.
 
     Args:
-        layout: What the folders are called.
-        least: What has to follow: ``classes`` or ``rain``.
+        layout: Names of the folders.
+        least: Required conclusion: ``classes`` or ``rain``.
 
     Returns:
         The card from whose folders so much follows; None without one.
@@ -48,7 +48,7 @@ def layouts_for(card: DataCard | None) -> tuple[Layout, ...]:
 
 
 def label_of(scan: Path, layouts: Iterable[Layout] | None = None) -> Path:
-    """Where a scan's labels lie: in the folder that its layout has for them, or beside it.
+    """Path of a scan's labels: in the folder that its layout has for them, or beside it.
 
     Args:
         scan: The scan.
@@ -64,7 +64,7 @@ def label_of(scan: Path, layouts: Iterable[Layout] | None = None) -> Path:
 
 
 def label_places(scan: Path) -> Iterator[Path]:
-    """Where labels of a scan are looked for beside its folder, whether or not any are there."""
+    """Places to look for the labels of a scan beside its folder, existing or not."""
     for folder in dict.fromkeys(layout.labels for layout in known_layouts()):
         yield Layout(labels=folder).label_of(scan)
 
@@ -82,5 +82,5 @@ def _packaged() -> tuple[DataCard, ...]:
 
 
 def _rank(detected: AutoDetect) -> int:
-    """How much follows from the names of folders: listed from the least to the most."""
+    """Rank of folder names by how much follows from them, from the least to the most."""
     return get_args(AutoDetect).index(detected)

@@ -1,4 +1,4 @@
-"""Where the scans and labels of a data set lie."""
+"""The layout of a data set: its folders of scans and labels."""
 
 import os
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from derain.files.names import scan_stem
 
 @dataclass(frozen=True)
 class Layout:
-    """Where scans and labels lie: ``root/<sequences>/<sequence>/<scans>/<frame>.bin``.
+    """Folders of scans and labels: ``root/<sequences>/<sequence>/<scans>/<frame>.bin``.
 
     Its defaults are the names of SemanticKITTI, which most data sets have taken over.
 
@@ -32,7 +32,7 @@ class Layout:
 
     @classmethod
     def of(cls, entry: Entry) -> "Layout":
-        """The layout that stands on a data card.
+        """The layout on a data card.
 
         Raises:
             InputError: Something that is not a layout.
@@ -41,7 +41,7 @@ class Layout:
         return cls(**entry.record(names, required=()))
 
     def label_of(self, scan: Path) -> Path:
-        """Where the labels of a scan in the folder of scans lie."""
+        """Path of the labels of a scan in the folder of scans."""
         return folder_above(folder_above(scan)) / self.labels / f"{scan_stem(scan)}{LABEL}"
 
 

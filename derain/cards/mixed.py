@@ -31,7 +31,7 @@ class LabelMap:
 
         Args:
             label: The data set's own ids, int64 (N,).
-            name: What messages call the labels.
+            name: Name of the labels in messages.
 
         Raises:
             InputError: Ids that are no classes of the data set.
@@ -48,7 +48,7 @@ class LabelMap:
 
 
 def label_maps(cards: Mapping[str, DataCard]) -> dict[str, LabelMap]:
-    """Where each data set's classes stand among those of all, which are counted through.
+    """Maps from each data set's class ids to those of all, which are numbered consecutively.
 
     Args:
         cards: Data cards, by the name of the part that each is of.

@@ -16,9 +16,9 @@ def require_rain(found: bool, card: DataCard, subject: str | Path) -> None:
     """Refuses to learn from labelled scans without rain.
 
     Args:
-        found: Whether any point of the scans is rain.
+        found: True if any point of the scans is rain.
         card: Their data card.
-        subject: What messages call the scans.
+        subject: Name of the scans in messages.
 
     Raises:
         InputError: No point is rain.
@@ -31,7 +31,7 @@ def warn_without_rain(found: bool, card: DataCard) -> None:
     """Warns where scans without rain are measured, unless the data card is one of clean data.
 
     Args:
-        found: Whether any point of the scans is rain.
+        found: True if any point of the scans is rain.
         card: Their data card.
     """
     if card.rain and not found:

@@ -20,9 +20,10 @@ a baseline: position and intensity, learnt from the training scans, all and none
 With --runtime, each model has a second row for that runtime, and derain prints how it differs from
 onnxruntime.
 Scoring runs all methods in one process, where filters share one neighbour search, or unit by unit
-in processes (--workers), shards or a Dask cluster, with the same figures: of more than --block
-scans derain keeps records in --out, what was stopped goes on, and `derain status` prints how far it
-is. Each method is then timed alone, in its own process, by the command that scores the last unit.
+in processes (--workers), shards or a Dask cluster, with the same figures. For more than --block
+scans derain keeps records in --out: a bench that was stopped resumes, and `derain status` prints
+its progress. Each method is then timed alone, in its own process, by the command that scores the
+last unit.
 """
 
 import argparse
@@ -118,7 +119,7 @@ def main(arguments: argparse.Namespace) -> int:
         scale = scans.loading.intensity_scale
         return LabelledFrames(scans.card, frames, scale, scans.distinct, rates)
 
-    # Read only when they are asked for: a bench without such a baseline needs no training scans.
+    # Read at their first use: a bench without such a baseline needs no training scans.
     methods = bench_entries(
         arguments.methods,
         (lambda: labelled_frames(training, _frames(training, "train")).truths())
@@ -142,7 +143,7 @@ def main(arguments: argparse.Namespace) -> int:
         with executor_of(arguments, workers) as executor:
             counted = count_in_units(methods, chosen, arguments.threads, out, division, executor)
         if counted is None:
-            print_lines(f"How far the other shards are: derain status {out}")
+            print_lines(f"Progress of the other shards: derain status {out}")
             return None
         found = run_bench(methods, chosen, effort, command, counted)
         found.write(out)
@@ -155,7 +156,7 @@ def main(arguments: argparse.Namespace) -> int:
         return 0
     if not data.has_parts:
         raise InputError(
-            arguments.data[0], "has no split, which the paper's tables ask for", "Name the root."
+            arguments.data[0], "has no split, which the paper's tables need", "Name the root."
         )
     table = paper_table(arguments.paper)
     groups = scans_by_group(table, partial(_frames, data), lambda frame: rates.get(frame.sequence))

@@ -1,10 +1,10 @@
 """Shows every step from scans to a deployed model, on simulated rain.
 
-First the model that comes with derain cleans two simulated scans that come along, or with --scan
-scans of your own. Then it simulates rain in streets and draws a scan of it; trains 3D-OutDet,
-SalsaNext and LiSnowNet-L1 on the scans, the last without labels; exports and proves each; cleans
-scans; and compares the networks with filters, with the model that comes with derain, and with
-baselines that every method has to beat.
+First the model that comes with derain cleans two simulated scans, or with --scan scans of your own.
+Then the command simulates rain in streets and draws a scan of it; trains 3D-OutDet, SalsaNext and
+LiSnowNet-L1 on the scans, the last without labels; exports and proves each; cleans scans; and
+compares the networks with filters, with the model that comes with derain, and with baselines that
+every method has to beat.
 
   derain demo
   derain demo --out somewhere

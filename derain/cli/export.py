@@ -7,11 +7,11 @@
 
 With --candidates, the model judges only points within a few bounds of range, height and intensity.
 derain fits the bounds to labelled scans, so that they hold, with a margin, all but a thousandth of
-the rain that the network finds there, and prints what they cost. For points within the bounds, the
+the rain that the network finds there, and prints their cost. For points within the bounds, the
 model gives the same answer as without them.
 
 If the proof fails, derain leaves no file. With --int8, convolutions compute in eight bits, scaled
-by what they see in scans of the calibration folder. The network must find rain in these scans, and
+to their inputs on scans of the calibration folder. The network must find rain in these scans, and
 their intensities must have the unit of the training data.
 The file is the same for every runtime. If you name another, it has to pass the proof too.
 """
@@ -124,7 +124,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _fit_candidates(model: "DerainingModule", data: "LabelledScans", inside: float) -> None:
-    """Fits a model's candidates to labelled scans, and prints their bounds and what they cost."""
+    """Fits a model's candidates to labelled scans, and prints their bounds and their cost."""
     from derain.export.candidates import fit_network_candidates
     from derain.learning.task import EXAMPLE_SCANS
 

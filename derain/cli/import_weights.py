@@ -5,8 +5,8 @@ r"""Makes a checkpoint of derain from published weights.
   derain import-weights salsanext SalsaNext_valid_best --stats semantickitti --data rehearse3d \
       --grid rehearse3d --out salsanext.ckpt
 
---data names the data card of what the weights were trained on, which states their classes, rain and
-licence; --stats the one whose mean and standard deviation their input was normalised by. Each is a
+--data names the data card of the training data, with their classes, rain and licence; --stats names
+the card whose mean and standard deviation normalised the network's input. Each is a
 packaged card or a YAML file. The published REHEARSE-3D weights of 3D-OutDet fit the statistics of
 WADS best (inferred); those of SalsaNext were trained with SemanticKITTI's. --grid names the grid of
 the range images that the weights were trained on.
@@ -24,18 +24,17 @@ from derain.system.extras import CHECKPOINT_LIBRARIES, require
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
-    parser.add_argument("network", help="the network that they are weights of, such as outdet")
+    parser.add_argument("network", help="network of the weights, such as outdet")
     parser.add_argument("weights", type=Path, help="the published state_dict or checkpoint")
     parser.add_argument(
         "--stats",
         required=True,
         help="data card with their mean and std: wads, kitti, semantickitti, spray, or a YAML file",
     )
+    parser.add_argument("--data", help="data card of the training data (default: that of --stats)")
     parser.add_argument(
-        "--data", help="data card of what they were trained on (default: that of --stats)"
-    )
-    parser.add_argument(
-        "--grid", help="of a range image, where they see one: semantickitti, rehearse3d or wads"
+        "--grid",
+        help="grid of the range image, if the network uses one: semantickitti, rehearse3d or wads",
     )
     parser.add_argument(
         "--out", type=file_named(".ckpt"), required=True, help="the checkpoint to write"
@@ -55,13 +54,13 @@ def main(arguments: argparse.Namespace) -> int:
     published = {known: kind for known, kind in NETWORKS.items() if issubclass(kind, Published)}
     if name not in published:
         reason = "no weights of it were published" if name in NETWORKS else "no such network"
-        known = f"{did_you_mean(name, published)}Known are {', '.join(published)}."
+        known = f"{did_you_mean(name, published)}Available: {', '.join(published)}."
         raise InputError(name, reason, known)
     stats = load_card(arguments.stats)
     data = stats if arguments.data is None else load_card(arguments.data)
     if not data.rain:
         raise InputError(
-            "--data", f"{data.name} has no rain that weights could know", "Say what theirs had."
+            "--data", f"{data.name} has no rain", "Give the card of the weights' training data."
         )
     model = published[name].from_published(
         read_state_dict(arguments.weights), data.normalised_as(stats), arguments.grid

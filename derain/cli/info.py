@@ -1,13 +1,13 @@
 """Describes scans, label files, bags, exported models, checkpoints and data sets.
 
-For a scan it also prints the range image that fits, and how many rays have two returns; with
---card, how often the second return of a labelled scan is the surface behind rain. For a data set (a
-folder of sequences as of REHEARSE-3D, SemanticKITTI or WADS, or simulated; one sequence; or a
-folder of scans) it counts scans and points by class and rain rate. With --grid it fits one grid to
-all scans, for a configuration. `derain info default` prints the card of the model that comes with
-derain: what it is, how good it is, and when not to use it.
-Many scans are counted by processes (--workers), a Dask cluster (--dask) or shards (--shard). With
---out derain keeps records: what was stopped goes on, and `derain status` prints how far it is.
+For a scan it also prints the grid of the range image that fits, and the number of rays with two
+returns; with --card, how often the second return of a labelled scan is the surface behind rain. For
+a data set (a folder of sequences as of REHEARSE-3D, SemanticKITTI or WADS, or simulated; one
+sequence; or a folder of scans) it counts scans and points by class and rain rate. With --grid it
+fits one grid to all scans, for a configuration. `derain info default` prints the card of the model
+that comes with derain: what it is, how good it is, and when not to use it. Processes (--workers), a
+Dask cluster (--dask) or shards (--shard) count many scans. With --out derain keeps records: a count
+that was stopped resumes, and `derain status` prints its progress.
 
   derain info default
   derain info scan.bin
@@ -84,7 +84,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--out",
         type=place_of,
-        help="folder or URL for records of what is counted: the same command goes on where it was "
+        help="folder or URL for records of the counts: the same command resumes where it was "
         "stopped, and shards add up",
     )
     group.add_argument("--anew", action="store_true", help="count everything again")
@@ -157,8 +157,8 @@ def _describe_default(as_json: bool) -> None:
     if os.path.exists(DEFAULT):
         raise InputError(
             DEFAULT,
-            "it is the model that comes with derain, and a file or folder here has its name",
-            f"Write ./{DEFAULT} for that, or ask from another folder.",
+            "it names the model that comes with derain, and also a file or folder here",
+            f"Write ./{DEFAULT} for the file or folder, or run the command in another folder.",
         )
     model, card = default_model(), model_card()
     if as_json:
@@ -182,7 +182,7 @@ def _describe_folder(folder: Path, arguments: argparse.Namespace) -> None:
             executor,
         )
     if facts is None:
-        print_lines(f"How far the other shards are: derain status {arguments.out}")
+        print_lines(f"Progress of the other shards: derain status {arguments.out}")
         return
     print_lines(json.dumps(facts.as_dict()) if arguments.json else facts.as_text())
     if arguments.card is not None and not facts.total.labelled:

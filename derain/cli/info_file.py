@@ -1,4 +1,4 @@
-"""What ``derain info`` prints of a file: a scan, labels, a bag, a model or a checkpoint."""
+"""Facts that ``derain info`` prints about a file: scan, labels, bag, model or checkpoint."""
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
@@ -32,7 +32,7 @@ from derain.views.scan_issues import no_points
 
 
 def facts_of_file(path: Path, card_name: str | None, columns: Sequence[str]) -> dict[str, Any]:
-    """What is in a file, by its suffix.
+    """The facts about a file, by its suffix.
 
     Args:
         path: The file.
@@ -65,7 +65,7 @@ def facts_of_file(path: Path, card_name: str | None, columns: Sequence[str]) -> 
         case ".pt" | ".pth":
             raise InputError(
                 path,
-                "weights alone do not say how they are used",
+                "holds weights without the Spec of their use",
                 "Make a checkpoint of them with `derain import-weights`.",
             )
         case _:
@@ -124,7 +124,7 @@ def _span(values: NDArray[Any]) -> dict[str, float] | str:
 
 
 def _returns(scan: Scan, frame: Frame, card: DataCard | None) -> dict[str, Any] | str:
-    """How many rays have two returns, and what lies behind rain if labels are known."""
+    """Number of rays with two returns, and the classes behind rain if labels are known."""
     returns = pair_returns(scan)
     if not returns.dual:
         return "one of each ray"
@@ -133,7 +133,7 @@ def _returns(scan: Scan, frame: Frame, card: DataCard | None) -> dict[str, Any] 
         rain = card.rain_of(scan.with_label(frame.read_label(len(scan))))
     counts = RayCounts.of(scan, returns, rain)
     facts = {
-        "told by": returns.found_by,
+        "found by": returns.found_by,
         "rays": counts.rays,
         "with two returns": counts.dual,
         "share": round(counts.dual_share, 4),
@@ -158,7 +158,7 @@ def _of_bag(path: Path) -> dict[str, Any]:
     topics, clouds = {}, {}
     for topic in bag.topics:
         decoder = decoder_of(topic.type)
-        needs = "" if decoder is None else f"; no point clouds before {decoder} makes them"
+        needs = "" if decoder is None else f"; {decoder} turns it into point clouds"
         topics[topic.name] = f"{topic.type or 'no type'}, {topic.messages:,} messages{needs}"
         if topic.type == POINT_CLOUD and topic.messages:
             clouds[topic.name] = _of_clouds(CloudTopic(bag, topic))
@@ -173,7 +173,7 @@ def _of_bag(path: Path) -> dict[str, Any]:
 
 
 def _of_clouds(clouds: CloudTopic) -> dict[str, Any]:
-    """What the first cloud of a topic is, which mostly stands for all."""
+    """The layout of the first cloud of a topic, which mostly represents all."""
     try:
         cloud = clouds.cloud(0).cloud
     except InputError as error:

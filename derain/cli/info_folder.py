@@ -1,4 +1,4 @@
-"""What ``derain info`` prints of a folder: scans and points by class and by rain rate."""
+"""Facts that ``derain info`` prints about a folder: scans and points by class and rain rate."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -31,15 +31,15 @@ FOLDER_NAMES: CardRestsOn = "names of folders"
 
 @dataclass(frozen=True)
 class FolderFacts:
-    """What is in a folder of scans.
+    """The contents of a folder of scans.
 
     Attributes:
         folder: The folder.
-        layout: What its folders are called; None where scans lie directly in it, or in folders of
+        layout: Names of its folders; None where scans lie directly in it, or in folders of
             recordings.
         card: The data card that names the classes; None where none does.
-        card_rests_on: What the card was chosen by.
-        by_rain_rate: What was counted, by rain rate in mm/h in ascending order; None last, for
+        card_rests_on: Evidence for the card.
+        by_rain_rate: Counts by rain rate in mm/h in ascending order; None last, for
             where it is not known.
     """
 
@@ -61,14 +61,14 @@ class FolderFacts:
 
     @property
     def total(self) -> Contents:
-        """What was counted at all rain rates together."""
+        """The counts of all rain rates together."""
         total = Contents()
         for contents in self.by_rain_rate.values():
             total.add(contents)
         return total
 
     def as_dict(self) -> dict[str, Any]:
-        """The same as JSON knows it."""
+        """The same as JSON-able primitives."""
         return {
             "folder": str(self.folder),
             "layout": self.folders,
@@ -131,8 +131,8 @@ def facts_of_folder(
         layout_names: Names of its folders of scans and labels, with a comma between; None finds
             them.
         columns: Names of the columns of files that do not name them.
-        records: Where records of what is counted are kept; None keeps none.
-        division: How the scans are divided into units.
+        records: Folder for records of the counts; None keeps none.
+        division: Division of the scans into units.
         executor: Counts the units; None counts them in this process.
 
     Returns:
@@ -208,7 +208,7 @@ def _layout(folder: Path, card: DataCard | None, stated: str | None) -> Layout |
 
 
 def _card(folder: Path, layout: Layout | None) -> tuple[DataCard | None, CardRestsOn]:
-    """The data card that a folder shows by itself, and by what."""
+    """The data card guessed for a folder, and the evidence for it."""
     if manifest_of(folder):
         return load_card("simulated"), "manifest"
     return (None if layout is None else card_by_folders(layout, "classes")), FOLDER_NAMES

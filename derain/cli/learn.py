@@ -1,24 +1,24 @@
 """Trains a network to take the rain out of a sensor's scans, from an unlabelled recording.
 
-The recording is consecutive scans in a folder. A teacher labels each point rain, not rain or not
-known; a network is trained on these labels, exported as one ONNX file and proved; a report
+The recording is consecutive scans in a folder. A teacher labels each point rain, not rain or
+unknown; a network is trained on these labels, exported as one ONNX file and proved; a report
 describes how far to trust it, with the commands that repeat each step.
 
   derain learn recording/ --out model.onnx
   derain learn recording/ --out model.onnx --poses standing    the sensor stood still
   derain learn recording/ --out model.onnx --teacher persistence
   derain learn recording/ --out model.onnx --model salsanext --blind
-  derain learn recording/ --out model.onnx --start mine.ckpt   go on from a model of yours
+  derain learn recording/ --out model.onnx --start mine.ckpt   start from a model of yours
   derain learn recording/ --out model.onnx --rerun report.rrd  look at teacher and student
   derain learn drive.mcap --out model.onnx --topic /velodyne_points
-  derain run model.onnx more_scans/ --out cleaned              what it is for
+  derain run model.onnx more_scans/ --out cleaned              use the model
 
 The default teacher is the model that comes with derain, which sees the scans before and after each;
-the network begins with the weights of the same model. Where --model or --blind calls for another
-network, its weights are drawn at random. The teacher persistence goes by free space alone: solid
-things stay in their place, and drops do not. The report compares the two. Labels beside the scans
-are not read; with --card, they measure the finished model, for the record. Labels, runs and report
-go to a folder beside the model, which a second run clears.
+the network begins with the weights of the same model. If --model or --blind selects another
+network, its weights are random. The teacher persistence uses free space alone: solid things stay in
+their place, and drops do not. The report compares the two. Labels beside the scans are not read;
+with --card, they measure the finished model, for the record. Labels, runs and report go to a folder
+beside the model, which a second run clears.
 """
 
 import argparse
@@ -46,14 +46,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=file_named(".onnx"), required=True, help="the ONNX file to write"
     )
-    parser.add_argument("--model", choices=STUDENTS, help="(default: that of --start)")
+    parser.add_argument(
+        "--model", choices=STUDENTS, help="network to train (default: that of --start)"
+    )
     parser.add_argument("--start", metavar="MODEL", help=START_HELP)
     parser.add_argument(
         "--teacher",
         default=DEFAULT,
         metavar="METHOD",
-        help="what labels the scans: the model that comes with derain (%(default)s), persistence, "
-        "a filter such as crf, or a model of yours (.onnx)",
+        help="method that labels the scans: the model that comes with derain (%(default)s), "
+        "persistence, a filter such as crf, or a model of yours (.onnx)",
     )
     add_poses(parser)
     parser.add_argument("--epochs", type=count, help="passes over the scans (default: by model)")
@@ -62,7 +64,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="learn without intensity: for sensors of other units, or where it is of no use",
     )
-    parser.add_argument("--work", type=Path, help="folder for all else (default: beside the model)")
+    parser.add_argument(
+        "--work", type=Path, help="folder for everything else (default: beside the model)"
+    )
     parser.add_argument(
         "--card",
         help="data card of labels beside the scans, which measure the finished model for the "

@@ -19,15 +19,15 @@ from derain.system.extras import TRAINING_LIBRARIES, missing_extra, require
 DESCRIPTION = """\
 Takes the rain out of LiDAR and fused LiDAR + 4D-radar scans.
 
-  derain run scans/ --out cleaned                       clean scans by the model of derain's own
-  derain run model.onnx scans/ --out cleaned            by another; or `run dror ...`
-  derain view scans/000000.bin --out figure.png         look at what is taken
-  derain info default                                   what derain's own is, and how good
-  derain bench --data scans/ --methods default dsor     speed against error
+  derain run scans/ --out cleaned                       clean scans with derain's own model
+  derain run model.onnx scans/ --out cleaned            with another model; or `run dror ...`
+  derain view scans/000000.bin --out figure.png         see which points are removed
+  derain info default                                   describe derain's own model
+  derain bench --data scans/ --methods default dsor     compare error and time
   derain learn drive/ --out model.onnx                  learn from a recording without labels
   derain fit --config outdet_wads.yaml --data.root WADS train on your data
   derain export outdet.ckpt --out model.onnx            make a file that runs without torch
-  derain demo                                           the whole story on simulated rain
+  derain demo                                           all steps on simulated rain
 
 Rain means rain or snow, here and in all output.
 """
@@ -36,11 +36,11 @@ Rain means rain or snow, here and in all output.
 # chosen; those of TRAINING are Lightning's own, which parses their arguments itself.
 SUMMARIES = {
     "run": "clean scans on a CPU, without torch",
-    "status": "how far a run over many recordings is",
+    "status": "print the progress of a run over many recordings",
     "view": "look at a scan, or a recording, as several methods clean it",
     "info": "describe a scan, a label file, a model or a data set",
     "bench": "compare methods on labelled scans: error, time and memory",
-    "learn": "a derainer from an unlabelled recording, in about two minutes",
+    "learn": "train a derainer on an unlabelled recording, in about two minutes",
     "tune": "find a method's best parameters on labelled scans",
     "fit": "train a derainer",
     "validate": "measure a checkpoint on the validation scans",
@@ -48,12 +48,12 @@ SUMMARIES = {
     "predict": "write the labels that a checkpoint gives the test scans",
     "export": "make an ONNX file that runs on a CPU without torch",
     "import-weights": "make a checkpoint from published weights",
-    "simulate": "make a data set of simulated rain, or let it rain on clean scans",
+    "simulate": "make a data set of simulated rain, or add rain to clean scans",
     "annotate": "label the scans of a static scene by its geometry",
     "teach": "label recordings by a method, for a network to learn from",
     "fuse": "merge the frames of a LiDAR and of a 4D radar",
-    "odometry": "find where the sensor was, scan by scan",
-    "demo": "the whole story on simulated rain, in about six minutes",
+    "odometry": "compute the sensor's pose for each scan",
+    "demo": "all steps on simulated rain, in about six minutes",
 }
 
 # Exit code if the reader of the output closes the pipe, as of programs that SIGPIPE ends.
@@ -106,11 +106,11 @@ def main(arguments: list[str] | None = None) -> int:
             InputError(
                 error.filename or "system",
                 error.strerror or str(error),
-                "Check the path, its permissions, and the room on its disk.",
+                "Check the path, its permissions, and the free space on its disk.",
             )
         )
     except MemoryError:
-        return _refused(InputError("memory", "it is full", "Give it less at once."))
+        return _refused(InputError("memory", "it is full", "Process less at once."))
 
 
 def _cut_off(error: BrokenPipeError) -> int:

@@ -38,9 +38,9 @@ def list_methods(parser: Parser, of_recordings: bool = True) -> None:
 
     Args:
         parser: The command's parser.
-        of_recordings: Whether methods that see several scans are listed too.
+        of_recordings: True if methods that see several scans are listed too.
     """
-    # Listed when help is asked for: most starts need not look for what other packages bring.
+    # Listed only for the help: other commands need not look for methods of other packages.
     parser.late_epilog = partial(_listed_methods, of_recordings)
 
 
@@ -66,7 +66,7 @@ def add_runtime(parser: argparse.ArgumentParser, help: str) -> None:
 
     Args:
         parser: The command's parser.
-        help: What the command does with it.
+        help: Use of it by the command.
     """
     parser.add_argument(
         "--runtime",
@@ -132,14 +132,14 @@ def add_method_and_scans(parser: Parser, help: str) -> None:
 
     Args:
         parser: The command's parser.
-        help: What the scans are.
+        help: Description of the scans.
     """
     parser.add_argument(
         "method", metavar="[METHOD]", help="ONNX file, YAML file of parameters, or name of a method"
     )
     list_methods(parser)
     add_threads(parser)
-    add_runtime(parser, help="what runs the model")
+    add_runtime(parser, help="runtime of the model")
     parser.add_argument(
         "--parameters", type=Path, metavar="YAML", help="parameters of the method, from derain tune"
     )
@@ -194,7 +194,7 @@ def method_and_scans(
     if there and not of_method:
         raise InputError(
             first,
-            "it is a method's name, and a file or folder here has it, too",
+            "it names a method, and also a file or folder here",
             f"Write ./{first} to have that judged by the model that comes with derain, or "
             f"{beside} to have others judged by the method.",
         )

@@ -58,7 +58,7 @@ def column_names(text: str) -> tuple[str, ...]:
 
 
 def file_named(*suffixes: str) -> Callable[[str], Path]:
-    """A file to write, with a suffix by which other commands know its kind.
+    """A file to write, with a suffix that other commands accept.
 
     Args:
         suffixes: The suffixes that it may have.
@@ -92,9 +92,9 @@ def add_columns(
 
     Args:
         parser: The command's parser, or a group of its arguments.
-        option: What the option is called.
+        option: Name of the option.
         of: Whose files they are, where a command reads several kinds.
-        default: What it is where it is not given; None leaves that to the command.
+        default: Its default; None leaves that to the command.
     """
     parser.add_argument(
         option,
@@ -130,7 +130,7 @@ def add_topic(parser: argparse.ArgumentParser) -> None:
 
 
 def add_poses(parser: argparse.ArgumentParser) -> None:
-    """Declares where poses come from, as :func:`derain.recordings.posed.with_poses` takes it."""
+    """Declares the source of poses, for :func:`derain.recordings.posed.with_poses`."""
     parser.add_argument(
         "--poses",
         metavar="POSES",
@@ -187,7 +187,7 @@ def labelled(
         columns: Names of the columns of files that do not name them.
         intensity_scale: Factor from the scans' intensities to the unit of the data card.
         topic: Topic of point clouds in bags; None where the paths name it.
-        distinct: Whether points at one position count once; None follows the data card.
+        distinct: True if points at one position count once; None follows the data card.
 
     Raises:
         InputError: Data whose labels nothing explains, or a root without sequences.

@@ -1,4 +1,4 @@
-"""What commands print, and the folders that they may write to."""
+"""Output of commands: lines, errors, exit codes, and the folders that they may write to."""
 
 import json
 import sys
@@ -18,8 +18,8 @@ def folder_sink(out: Path, source: Source) -> FolderSink:
     """The folder that a command writes to, once it is known to overwrite nothing of the source.
 
     Args:
-        out: What ``--out`` names.
-        source: What is read.
+        out: Place of ``--out``.
+        source: The source.
 
     Raises:
         InputError: It holds a scan or labels that would be overwritten, or two scans have one name.
@@ -35,7 +35,7 @@ def print_facts(facts: Mapping[str, Any], text: str, as_json: bool) -> None:
     Args:
         facts: As an object.
         text: As a line of text; a name in it may hold anything.
-        as_json: Which of the two.
+        as_json: True for JSON.
     """
     tqdm.write(json.dumps(facts) if as_json else printable(text), sys.stdout)
     sys.stdout.flush()  # so that the reader of a pipe gets each line at once
@@ -46,7 +46,7 @@ def print_lines(text: str, stream: TextIO | None = None) -> None:
 
     Args:
         text: The lines; names in them may hold anything.
-        stream: Where to; None is the standard output.
+        stream: Stream to print to; None is the standard output.
     """
     tqdm.write("\n".join(map(printable, text.split("\n"))), stream or sys.stdout)
 
@@ -61,7 +61,7 @@ def noting_progress(so_far: Callable[[], str]) -> Iterator[None]:
     """Adds to the error of a closed pipe, as by ``| head``, what the command has written by then.
 
     Args:
-        so_far: What is written, for instance "2 of 41 scans are written".
+        so_far: The written results, for instance "2 of 41 scans are written".
     """
     try:
         yield
@@ -76,7 +76,7 @@ def exit_code(failed: int, scans: int, outcome: str) -> int:
     Args:
         failed: Number of scans that failed.
         scans: Number of all scans.
-        outcome: What became of those that failed, with their number as ``{scans}``.
+        outcome: Outcome of those that failed, with their number as ``{scans}``.
     """
     if not failed:
         return 0

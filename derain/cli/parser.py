@@ -1,4 +1,4 @@
-"""The parser of the command line: what it cannot understand is one line with a remedy."""
+"""The parser of the command line, whose errors are one line with a remedy."""
 
 import argparse
 import math
@@ -42,7 +42,7 @@ class Parser(argparse.ArgumentParser):
     the first examples, and those options are left to ``--help-all``.
 
     Attributes:
-        late_epilog: Makes the end of the help when help is asked for; None where it has none.
+        late_epilog: Makes the end of the help when the help is printed; None without one.
     """
 
     late_epilog: Callable[[], str] | None = None
@@ -61,7 +61,7 @@ class Parser(argparse.ArgumentParser):
         Args:
             options: Each by one of its names.
         """
-        text = "show all options, and what there is to know of them"
+        text = "show all options, with full explanations"
         self.add_argument(HELP_ALL, action=_HelpAll, nargs=0, help=text)
         self._whole_description = self.description
         self.description = _first_examples(self.description or "")
@@ -96,7 +96,7 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: Any = None
     ) -> tuple[Any, list[str]]:
-        """Parses the options of a command, each of which must be one that there is."""
+        """Parses the options of a command; refuses unknown ones."""
         if args is not None and self._subparsers is None:
             self._refuse_unknown_options(args)
         return super().parse_known_args(args, namespace)
@@ -117,7 +117,7 @@ class Parser(argparse.ArgumentParser):
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
             named = "/".join(action.option_strings) or str(action.metavar)
-            remedy = f"{did_you_mean(value, action.choices)}Known are {', '.join(action.choices)}."
+            remedy = f"{did_you_mean(value, action.choices)}Available: {', '.join(action.choices)}."
             raise InputError(named, f"there is no {value}", remedy)
 
     def _example(self) -> str:

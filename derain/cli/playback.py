@@ -1,4 +1,4 @@
-"""Writes recordings for Rerun's viewer, and prints what came of it."""
+"""Writes recordings for Rerun's viewer, and prints the result."""
 
 import sys
 from collections.abc import Mapping
@@ -35,7 +35,7 @@ def refuse_unusable(out: Path) -> None:
 def write_and_report(
     out: Path, selection: "Selection", methods: Mapping[str, Method], labels: "Labels | None"
 ) -> int:
-    """Writes the file, and prints what it shows, its size, and errors of single scans.
+    """Writes the file, and prints its contents, its size, and errors of single scans.
 
     Args:
         out: The file, which :func:`refuse_unusable` has let pass.

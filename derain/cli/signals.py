@@ -1,4 +1,4 @@
-"""Signals that ask a command to end: they interrupt it, so that it cleans up."""
+"""Signals that end a command: they interrupt it, so that it cleans up."""
 
 import signal
 import threading

@@ -1,4 +1,4 @@
-"""Simulates a data set of rain, or lets it rain on clean scans.
+"""Simulates a data set of rain, or adds rain to clean scans.
 
 By default it simulates a rain facility in the layout of REHEARSE-3D: LiDAR, radar, both merged,
 labels, weather. Every sequence is another track: 60 % for training, 20 % each for validation and
@@ -12,15 +12,15 @@ test. Training needs three or more sequences; one is enough to look at.
   derain simulate --out country --layout country --sensor spinning_64 --no-radar
   derain simulate --out drive --layout street --speed 13 --traffic 8 --sensor spinning_64
 
-As in the real facility, only rain is near the sensor, and little else is as dim: rules of position
-or of intensity find it. The streets have boughs and bushes between the drops. The other layouts
-have many objects that look like drops: windows, nets, twigs, grass, and people near the sensor.
-With --speed the sensor drives along a street, without a radar; with --traffic cars and pedestrians
-move. derain then also writes poses.txt, and numbers moving objects in the upper 16 bits of the
-labels.
+As in the real facility, only rain is near the sensor, and little else is as dim, so that rules of
+position or of intensity find it. The streets have boughs and bushes between the drops. The other
+layouts have many objects that look like drops: windows, nets, twigs, grass, and people near the
+sensor. With --speed the sensor drives along a street, without a radar; with --traffic cars and
+pedestrians move. derain then also writes poses.txt, and numbers moving objects in the upper 16 bits
+of the labels.
 
-The sequences take the rain rates in turn; 0 is clean. A second call continues an interrupted run;
-`derain status` prints how far it is. To train on the data set:
+The sequences use the rain rates in turn; 0 is clean. A second call continues an interrupted run;
+`derain status` prints its progress. To train on the data set:
 
   derain fit --config outdet_simulated.yaml --data.root facility --data.make false
 
@@ -31,8 +31,8 @@ derain/simulation/worlds/world.yaml.
   derain simulate --out worlds --world --sequences 500
   derain fit --config relative_outdet_worlds.yaml --data.root worlds --data.make false
 
-Many machines make one data set, in a folder that all of them see: by --dask, or each by its shard.
-Whichever ends last completes manifest.json. Neither changes a byte.
+Many machines can make one data set in a folder that they share: with --dask, or one shard each. The
+last one to end completes manifest.json. The bytes stay the same.
 
   derain simulate --out worlds --world --sequences 100000 --shard 0/4
   derain status worlds
@@ -185,13 +185,13 @@ def main(arguments: argparse.Namespace) -> int:
     with executor_of(arguments, arguments.workers or usable_cores()) as executor:
         complete = simulate_track(arguments.out, campaign, executor, shard_of(arguments))
     if not complete:
-        outputs.print_lines(f"How far the other shards are: derain status {arguments.out}")
+        outputs.print_lines(f"Progress of the other shards: derain status {arguments.out}")
         return 0
     sequences = len(campaign.names)
     scans = sequences * (1 if in_world else arguments.scans)
     outputs.print_lines(
         f"{arguments.out}: {sequences} sequences, {scans:,} scans. "
-        f"What is in them: derain info {arguments.out}"
+        f"To describe them: derain info {arguments.out}"
     )
     return 0
 
@@ -200,11 +200,11 @@ def _refuse(foreign: Iterable[str], arguments: argparse.Namespace, needs: str) -
     """Refuses the options of other uses."""
     for name in foreign:
         if getattr(arguments, name) is not None:
-            raise InputError(f"--{name}", f"has a meaning only {needs}", "Leave it out.")
+            raise InputError(f"--{name}", f"works only {needs}", "Leave it out.")
 
 
 def _campaign(options: argparse.Namespace) -> "Campaign | WorldCampaign":
-    """What is simulated: sequences of tracks, or scans of worlds."""
+    """The campaign to simulate: sequences of tracks, or scans of worlds."""
     from derain.simulation.campaign import FACILITY_RAIN_RATES, Campaign, Drive, partition
     from derain.simulation.radar import Radar
     from derain.simulation.world import WorldCampaign
@@ -226,7 +226,7 @@ def _campaign(options: argparse.Namespace) -> "Campaign | WorldCampaign":
 
 
 def _rain_on_scans(arguments: argparse.Namespace) -> int:
-    """Writes clean scans in the rain, and prints what it did to each."""
+    """Adds rain to clean scans, writes them, and prints the changes of each."""
     if arguments.picture:
         require("--picture", MATPLOTLIB)
         from derain.pictures.scan_pictures import before_after_figure, save
@@ -235,7 +235,7 @@ def _rain_on_scans(arguments: argparse.Namespace) -> int:
     from derain.simulation.sensor import load_sensor
 
     if not arguments.rain or len(arguments.rain) > 1:
-        raise InputError("--rain", "it rains on scans at one rate", "Give one, e.g. --rain 25.")
+        raise InputError("--rain", "scans take a single rain rate", "Give one, e.g. --rain 25.")
     rain, sensor = UniformRain(*arguments.rain), load_sensor(arguments.sensor or "spinning_64")
     source = named_frames(arguments.on, arguments.columns or DEFAULT_COLUMNS)
     sink = outputs.folder_sink(arguments.out, source)
@@ -255,7 +255,7 @@ def _rain_on_scans(arguments: argparse.Namespace) -> int:
                     save(figure, sink.path(frame, ".png"))
                 written += 1
                 _print_rain(frame.name, clean, rainy, int(drops.sum()), arguments.json)
-    return outputs.exit_code(len(failures.errors), len(source), "it could not rain on {scans}")
+    return outputs.exit_code(len(failures.errors), len(source), "no rain could be added to {scans}")
 
 
 def _print_rain(name: str, clean: "Scan", rainy: "Scan", drops: int, as_json: bool) -> None:

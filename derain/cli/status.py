@@ -1,15 +1,14 @@
-"""Prints how far a command over many scans is: done, failed and missing units, totals of a run.
+"""Prints the progress of a command over many scans: done, failed and missing units, and totals.
 
   derain status cleaned
   derain status worlds --json
   derain status s3://bucket/cleaned
 
-A unit is a recording, a bag, or a block of scans of a long recording; of simulate it is a sequence.
-run, teach and bench keep a record of each unit in the folder of --out where there are more than 50
-scans, several processes or machines; simulate always does, and info where --out names a folder. A
-failed unit is done again by the same command, and so is a missing one. For shards of a SLURM array,
-the last line has the tasks that are to be run again.
-The exit code is 2 unless all units are done.
+A unit is a recording, a bag, or a block of scans of a long recording; for simulate it is a
+sequence. run, teach and bench keep a record of each unit in the --out folder for more than 50
+scans, several processes or several machines; simulate always does, and info if --out names a
+folder. The same command repeats failed units and does missing ones. For shards of a SLURM array,
+the last line lists the tasks to run again. The exit code is 2 unless all units are done.
 """
 
 import argparse

@@ -12,15 +12,15 @@ points that are not known.
 
 METHOD is a method that sees several scans, a filter, the model that comes with derain (below), a
 model of your own (.onnx), or parameters from `derain tune` (.yaml). It is optional: if the first
-word is a folder or a scan, the model that comes with derain labels all scans, each by the scans
-around it, too. derain writes the labels, their data card and a list of the scans; the scans stay in
+word is a folder or a scan, the model that comes with derain labels all scans, also using the scans
+around each. derain writes the labels, their data card and a list of the scans; the scans stay in
 their place. The last fifth of each sequence is the validation part. Scans without any known point
 are left out.
-Of more than --block scans derain keeps records in --out: what was stopped goes on, and `derain
-status` prints how far it is. Processes, a Dask cluster and shards write the same bytes; the labels
-are put in their place when all are there. Where scans of a shard failed, the same command without
---shard ends it.
-With --card, the meaning of the scans' own labels, derain also compares its labels with these, for
+For more than --block scans derain keeps records in --out: a run that was stopped resumes, and
+`derain status` prints its progress. Processes, a Dask cluster and shards write the same bytes; the
+labels are moved into place when all are there. If scans of a shard failed, the same command without
+--shard completes the labels.
+With --card, the data card of the scans' own labels, derain also compares its labels with these, for
 the record only: they do not change the result.
 """
 
@@ -120,7 +120,7 @@ def main(arguments: argparse.Namespace) -> int:
             stream,
         )
     if not results.manifest.finished:
-        print_lines(f"How far the other shards are: derain status {arguments.out}", stream)
+        print_lines(f"Progress of the other shards: derain status {arguments.out}", stream)
     failed = len(failures.errors)
     return exit_code(failed, len(source), "{scans} could not be judged, and have no labels")
 

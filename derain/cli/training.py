@@ -14,7 +14,7 @@ to runs/<name>/version_<n>.
 
   derain fit --config outdet_wads.yaml --data.root WADS
   derain fit --config outdet_wads.yaml --data.root WADS --trainer.logger.name my_run
-  derain fit --config outdet_wads.yaml --data.root WADS --ckpt_path .../last.ckpt   (goes on)
+  derain fit --config outdet_wads.yaml --data.root WADS --ckpt_path .../last.ckpt   (resumes)
   derain fit --config outdet_wads.yaml --data.root WADS --start trained.ckpt   (from its weights)
   tensorboard --logdir runs
 """,
@@ -29,7 +29,7 @@ Measures a checkpoint on the test scans: scores by average, class and range.
   derain test --config outdet_wads.yaml --data.root WADS --ckpt_path outdet.ckpt
 """,
     "predict": """\
-Writes the labels that a checkpoint gives the test scans, which need none of their own.
+Writes the labels that a checkpoint gives the test scans. The scans need no labels.
 
   derain predict --config outdet_wads.yaml --data.root WADS --ckpt_path outdet.ckpt \\
       --predictions.folder labels
@@ -66,7 +66,7 @@ def short_help(command: str) -> str:
     return (
         f"usage: derain {command} --config FILE [--OPTION VALUE ...]\n\n{EXAMPLES[command]}\n"
         f"packaged configurations:\n{configurations}\n\noptions:\n{OPTIONS}\n\n"
-        "Any option can stand in a configuration, and any key of one be given as an option.\n"
+        "A configuration can set any option, and an option can set any key of a configuration.\n"
         f"All options: derain {command} {ALL}. All values, as they would be used: --print_config."
     )
 

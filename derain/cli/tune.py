@@ -9,12 +9,12 @@ It writes them for `derain run --parameters` and `derain bench --methods`.
   derain tune default --data scans/ --card wads --out default.yaml
 
 Optuna searches the parameters of a filter, starting at the defaults. The neighbours of each scan
-are found once, and take some 150 bytes per point. With --storage, a second call continues up to
---trials, and calls at the same time share them and find the same. Several machines need a journal
-in a folder that all of them see, or a database: postgresql+psycopg://USER@HOST/DATABASE.
-With --candidates, the filter looks for rain only within bounds of range, height and intensity that
-hold a share of the rain.
-The threshold of a model follows from its probabilities, without trials.
+are found once, and take about 150 bytes per point. With --storage, a second call continues up to
+--trials, and simultaneous calls share the trials and find the same parameters. Several machines
+need a journal in a folder that all of them see, or a database:
+postgresql+psycopg://USER@HOST/DATABASE. With --candidates, the filter looks for rain only within
+bounds of range, height and intensity that hold a share of the rain. The threshold of a model
+follows from its probabilities, without trials.
 """
 
 import argparse
@@ -98,7 +98,7 @@ def main(arguments: argparse.Namespace) -> int:
         candidates = None
         if arguments.candidates is not None:
             candidates = bounds_of_rain(data, drawn, arguments.candidates)
-            every = "every point, for no bounds separate rain from the rest"
+            every = "every point: no bounds separate rain from the rest"
             print_lines(f"candidates: {candidates or every}")
         tuned = tune_filter_on(
             method,

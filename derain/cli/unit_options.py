@@ -34,7 +34,7 @@ def add_units(
 
     Args:
         parser: The command's parser.
-        workers: How many processes there are by default.
+        workers: The default number of processes, as text of the help.
     """
     group = parser.add_argument_group("many scans")
     add_executor(group, f"processes, which share the threads (default: {workers})")
@@ -46,14 +46,14 @@ def add_units(
         f"runs of more than {BLOCK} scans keep)",
     )
     group.add_argument(
-        "--anew", action="store_true", help="do everything again, also with other options"
+        "--anew", action="store_true", help="do everything again, even with other options"
     )
     group.add_argument(
         "--block",
         type=count,
         default=BLOCK,
         metavar="SCANS",
-        help="scans of a unit of a long recording (default: %(default)s)",
+        help="scans per unit of a long recording (default: %(default)s)",
     )
 
 
@@ -61,7 +61,7 @@ def add_executor(group: "argparse._ArgumentGroup", workers: str) -> None:
     """Declares the options of :func:`executor_of`.
 
     Args:
-        group: Where they are declared.
+        group: Group to declare the options in.
         workers: Help of ``--workers``.
     """
     group.add_argument("--workers", type=count, metavar="N", help=workers)
@@ -78,7 +78,7 @@ def add_shard(group: "argparse._ArgumentGroup") -> None:
         "--shard",
         type=shard,
         metavar="I/N",
-        help="do shard I of N, from 0 on (default: by SLURM_ARRAY_TASK_ID, where there is one)",
+        help="process shard I of N, from 0 on (default: from SLURM_ARRAY_TASK_ID, if set)",
     )
 
 
@@ -93,15 +93,18 @@ def shard(text: str) -> Shard:
 
 
 def shard_of(arguments: argparse.Namespace) -> Shard | None:
-    """The shard of the work that is done, of which it warns where nobody asked; None for all."""
+    """The shard of the work to do, with a warning if it comes from SLURM alone; None for all."""
     found: Shard | None = arguments.shard or Shard.of_environment()
     if found is not None and found.of_array:
-        warn(f"{TASK} is {found.number + found.first}: one shard is done; --shard 0/1 does all")
+        warn(
+            f"{TASK} is {found.number + found.first}: "
+            "only one shard is processed; --shard 0/1 processes all"
+        )
     return found
 
 
 def division_of(arguments: argparse.Namespace) -> Division:
-    """How the arguments divide the work.
+    """The division of the work by the arguments.
 
     Raises:
         InputError: Options that exclude each other.
@@ -163,7 +166,7 @@ def with_given_poses(source: Source, arguments: argparse.Namespace) -> Source:
 
 
 def odometry_of(arguments: argparse.Namespace) -> Odometry | None:
-    """What finds the poses in the process that does a unit; None where they are not to be found."""
+    """The odometry for the process that does a unit; None if poses are not to be computed."""
     return Odometry(arguments.threads) if arguments.poses == ODOMETRY else None
 
 

@@ -111,7 +111,9 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     if arguments.rerun is not None:
         if arguments.out or arguments.window:
-            raise InputError("--rerun", "excludes --out and --window", "Leave them out.")
+            raise InputError(
+                "--rerun", "cannot be combined with --out or --window", "Leave them out."
+            )
         return _view_recording(arguments)
     path = arguments.scans[0]
     if or_example(path) != path:

@@ -75,7 +75,7 @@ def add_weather(parser: argparse.ArgumentParser) -> None:
 
 
 def weather_options(arguments: argparse.Namespace) -> WeatherOptions:
-    """How the arguments have the weather measured.
+    """The weather options of the arguments.
 
     Raises:
         InputError: Levels that cannot be, or a dry reference that cannot be read.
@@ -129,7 +129,7 @@ def weather_table(path: Path | None) -> Iterator[list[Sequence[object]]]:
         with reading(path), path.open("rb") as file:
             start = file.read(len(FIRST_COLUMNS))
         if start not in (FIRST_COLUMNS, b""):
-            reason = "is there already, and no table of the weather"
+            reason = "exists, and is not a table of the weather"
             raise InputError(path, reason, "Give --weather another file.")
     require_writable(path)
     try:
@@ -144,7 +144,7 @@ def weather_table(path: Path | None) -> Iterator[list[Sequence[object]]]:
 def _dry_reach(
     reference: Path, columns: Sequence[str], warning: Threshold, error: Threshold
 ) -> Visibility:
-    """The reach of the dry reference, of which no more than DRY_SCANS scans are read.
+    """The reach of the dry reference; at most DRY_SCANS of its scans are read.
 
     Raises:
         InputError: It cannot be read, or does not reach the end of any level.

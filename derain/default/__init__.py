@@ -1,4 +1,4 @@
-"""The model that comes with derain: its file, its card, and whether the one is the other's."""
+"""The model that comes with derain: its file, its card, and the check that they belong together."""
 
 import re
 from collections.abc import Callable
@@ -26,11 +26,11 @@ LARGEST_SEED = 2**32 - 1
 
 @dataclass(frozen=True)
 class ModelScore:
-    """How a model does on some data.
+    """Scores of a model on one data set.
 
     Attributes:
         data: Name of the data, with a word where their rain is simulated.
-        precision: Share of rain among what it takes; None where it was not measured, or where
+        precision: Share of rain among the removed points; None if it was not measured, or where
             nothing is rain.
         recall: Share of the rain that it takes; None as before.
         iou: Intersection over union of rain, of pooled counts; None as before.
@@ -46,7 +46,7 @@ class ModelScore:
 
     @classmethod
     def at(cls, entry: Entry) -> Self:
-        """The score that stands somewhere in a document.
+        """Reads a score from a document.
 
         Raises:
             InputError: Something that is none.
@@ -57,24 +57,24 @@ class ModelScore:
 
 @dataclass(frozen=True)
 class ModelCard:
-    """What must be known of a model that is handed out.
+    """The card of a published model: its origin, scores and limits.
 
     Source: the idea and the headings, M. Mitchell et al., "Model Cards for Model Reporting",
     FAT* 2019.
 
     Attributes:
-        name: What the model is called.
-        version: Which of the models that were handed out under this name it is.
-        what: What it is and what it sees, in a sentence.
+        name: Name of the model.
+        version: Version of the model among those of this name.
+        what: A description of the model and its inputs, in a sentence.
         training: Commands that make it again, in their order.
         seed: Seed of everything that was drawn at random for it.
-        data: What it learnt from.
+        data: Its training data.
         licence: Licence of the model, which those of the data allow.
         threshold: A point is rain where its probability is greater; as in its Spec.
-        threshold_chosen: How the threshold was chosen.
-        scores: How it does on data that it has not seen.
+        threshold_chosen: The choice of the threshold.
+        scores: Scores on data that it was not trained on.
         measured: Command that measures it.
-        not_for: When not to use it.
+        not_for: Cases in which not to use it.
         sha256: SHA-256 of its file, in hexadecimal digits.
     """
 
@@ -106,7 +106,7 @@ class ModelCard:
 
     @property
     def title(self) -> str:
-        """Name, version and the beginning of the checksum: enough to know it again by."""
+        """Name, version and the beginning of the checksum: enough to identify it."""
         return f"{self.name}, version {self.version} (sha256 {self.sha256[:12]})"
 
     def as_dict(self) -> dict[str, Any]:
@@ -173,7 +173,7 @@ def default_model() -> Path:
 
 
 def default_checkpoint() -> Path:
-    """The checkpoint of the same model, which a training may go on from.
+    """The checkpoint of the same model, as a start for training.
 
     Raises:
         InputError: It is missing.

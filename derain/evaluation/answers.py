@@ -64,7 +64,7 @@ class Answers:
         Args:
             scan: A scan with the teacher's labels.
             card: Data card of these labels.
-            called_rain: What the student calls rain, bool (N,); None without a student.
+            called_rain: The student's rain, bool (N,); None without a student.
 
         Raises:
             InputError: A scan without labels.
@@ -101,7 +101,7 @@ class Answers:
 
     @property
     def rain_among_known(self) -> float:
-        """Share of rain among the points of which the teacher is sure; NaN where there are none."""
+        """Share of rain among the points that the teacher is sure of; NaN if there are none."""
         not_rain, rain, _ = self.table.sum(axis=(0, 2))
         return float(ratio(rain, not_rain + rain))
 
@@ -136,7 +136,7 @@ class AnswersOfScan:
 
     Attributes:
         key: Key of the scan.
-        held_out: Whether the student did not learn from it, but is chosen and measured by it.
+        held_out: True if the student did not learn from it, but is chosen and measured by it.
         answers: The answers.
     """
 
@@ -164,7 +164,7 @@ class TruthRecord:
 
     Args:
         card: Data card of the scans.
-        titles: What each answer is called.
+        titles: Name of each answer.
 
     Attributes:
         scans: Number of scans that were measured.

@@ -65,7 +65,7 @@ class Contents:
 
     @classmethod
     def from_json(cls, counted: Mapping[str, Any]) -> Self:
-        """What :meth:`FrameCounting.value` counted."""
+        """Reads the counts of :meth:`FrameCounting.value`."""
         labelled = Counter({int(id_): points for id_, points in counted["labelled"].items()})
         return cls(0, counted["scans"], counted["points"], labelled)
 

@@ -63,7 +63,7 @@ def band_of(range: NDArray[np.floating], edges: Sequence[float] = RANGE_EDGES) -
     Args:
         range: Distance from the sensor, metres, (N,). Values that are not finite belong to the
             last band.
-        edges: Where the bands start, metres, rising from 0.
+        edges: Starts of the bands, metres, rising from 0.
     """
     finite_or_far = np.where(np.isfinite(range), range, np.inf)
     return np.searchsorted(edges[1:], finite_or_far, side="right").astype(np.int64)
@@ -152,7 +152,7 @@ class ClassCounts:
     Attributes:
         points: Points of the class.
         called_rain: Those called rain.
-        rain: Whether the class counts as rain.
+        rain: True if the class counts as rain.
     """
 
     points: int

@@ -35,7 +35,7 @@ class RayCounts:
         Args:
             scan: The scan, of N rows; a radar's detections are of no ray.
             returns: Its returns.
-            rain: Which rows are rain, bool (N,), by their labels or by a method; None where it is
+            rain: True for rows of rain, bool (N,), by their labels or by a method; None where it is
                 not known.
         """
         nearest = distinct_rows(scan)[0]

@@ -41,7 +41,7 @@ def example_scan(weather: Literal["rain", "snow"] = "snow") -> Scan:
         >>> clean = scan.xyz[~derain.Derainer()(scan)]
 
     Args:
-        weather: What falls.
+        weather: The precipitation.
 
     Returns:
         x, y, z in metres as seen from the sensor, intensities from 0 to 255, and labels.
@@ -62,7 +62,7 @@ def or_example(path: Path) -> Path:
 
 @dataclass
 class Truth:
-    """What of the rain of the example was found, by its labels.
+    """How much of the example's rain was found, by its labels.
 
     Attributes:
         rain: Points that are rain or snow.

@@ -94,7 +94,7 @@ def write_scan(path: Path | str, scan: Scan | NDArray[Any]) -> None:
     if isinstance(scan.header, PartialHeader) and scan.header.left_out:
         parts = ", ".join(scan.header.left_out)
         warnings.warn(
-            f"what is written of {scan.name} lacks its {parts}", ScanWarning, stacklevel=2
+            f"the written copy of {scan.name} lacks its {parts}", ScanWarning, stacklevel=2
         )
     with replacing(path) as temporary:
         temporary.write_bytes(compressed(content) if is_compressed(path) else content)

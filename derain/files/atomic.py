@@ -55,7 +55,7 @@ def writing(path: Path) -> Iterator[None]:
     """Turns the errors of writing `path` into an InputError.
 
     Args:
-        path: What the block writes.
+        path: File that the block writes.
 
     Raises:
         InputError: It cannot be written.
@@ -105,7 +105,7 @@ def require_writable_folder(folder: Path) -> None:
 
 
 def _target(path: Path) -> Path:
-    """The file that a path leads to, which may be written anew."""
+    """The file that a path leads to, if it may be replaced."""
     if path.exists() and not path.is_file():
         raise InputError(path, "is not a file that can be replaced", "Name a file to write.")
     return Path(os.path.realpath(path))
@@ -174,12 +174,12 @@ def remove_abandoned(folder: Path) -> None:
 
 
 def lock(descriptor: int, *, wait: bool, shared: bool = False) -> bool:
-    """Locks an open file or folder, until it is closed, against all others that ask in this way.
+    """Locks an open file or folder, until it is closed, against all others that lock it here.
 
     Args:
         descriptor: The file or the folder.
-        wait: Whether to wait for another process that holds it.
-        shared: Whether others may hold it at the same time that share it, too.
+        wait: True to wait for another process that holds it.
+        shared: True if others may hold it at the same time that share it, too.
 
     Returns:
         False where another holds it and is not waited for.

@@ -104,13 +104,13 @@ def _coordinates(path: Path, fields: Mapping[str, NDArray[Any]]) -> NDArray[np.f
         raise InputError(
             path,
             f"has no x, y and z among its columns ({', '.join(fields)})",
-            "Name the coordinates x, y and z, where the file has no names with --columns.",
+            "Name the coordinates x, y and z; --columns names the columns of a file without names.",
         )
     return np.stack([to_float32(axis) for axis in axes], axis=1)
 
 
 def columns_of(scan: Scan) -> dict[str, NDArray[Any]]:
-    """The columns that stand for a scan in a file.
+    """The columns of a scan in a file.
 
     Returns:
         Name → column of N rows: the columns of the scan's own file, or x, y, z (and intensity) of a

@@ -1,4 +1,4 @@
-"""The content of a scan file, and the one bound on what it may expand to.
+"""The content of a scan file, and the one bound on its expanded size.
 
 A small file can claim or hold far more than any scan: counts in a header, zeros that compress a
 thousandfold. Whatever a reader makes room for, it takes from the file's `MemoryBudget` first.
@@ -50,12 +50,12 @@ class MemoryBudget:
 
 @dataclass(frozen=True)
 class Content:
-    """What a scan file holds.
+    """The content of a scan file.
 
     Attributes:
         path: The file.
         data: Its bytes, decompressed where the file is compressed as a whole.
-        budget: What they may expand to.
+        budget: Bound on their expanded size.
     """
 
     path: Path

@@ -41,7 +41,7 @@ _SAFE_LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 class _Loader(_SAFE_LOADER):  # type: ignore[misc]
-    """Refuses a mapping that has a key twice, of which YAML's own takes the last."""
+    """Refuses a mapping with a key twice; YAML's own loader takes the last."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> Any:
         keys = set()
@@ -80,15 +80,15 @@ _SHORT.maxlevel, _SHORT.maxstring, _SHORT.maxother = 2, 60, 60
 
 @dataclass(frozen=True)
 class Entry:
-    """A value of a document that knows its place, so that an error can name it.
+    """A value of a document with its place, so that an error can name it.
 
     Every method raises InputError for a value of another kind than it reads; the message has the
     document and the key.
 
     Attributes:
-        source: The file, or whatever else holds the document.
+        source: The file, or other container of the document.
         key: Keys that lead to the value, joined by dots; empty for the whole document.
-        value: What stands there.
+        value: The value.
     """
 
     source: Path | str
@@ -119,11 +119,11 @@ class Entry:
 
     @classmethod
     def of_json(cls, text: str, source: Path | str, largest: int = LARGEST_DOCUMENT) -> "Entry":
-        """A JSON document that stands in something else, such as the metadata of a model.
+        """Reads a JSON document inside another file, such as the metadata of a model.
 
         Args:
             text: The document.
-            source: What it stands in, for messages.
+            source: The surrounding file, for messages.
             largest: Characters that it may have.
 
         Raises:
@@ -164,7 +164,7 @@ class Entry:
         }
 
     def each(self, read: Callable[["Entry"], Parsed]) -> dict[str, Parsed]:
-        """What a function reads of each value of a mapping, by key."""
+        """Parses each value of a mapping; returns the results by key."""
         return {key: read(entry) for key, entry in self.members().items()}
 
     def numbered(self, least: int, most: int) -> dict[int, "Entry"]:
@@ -181,16 +181,16 @@ class Entry:
     def record(
         self, parsers: Mapping[str, Callable[["Entry"], Any]], required: Collection[str] = ()
     ) -> dict[str, Any]:
-        """What is in a mapping whose keys are known.
+        """Parses a mapping with known keys.
 
         Args:
-            parsers: What reads the value, by key.
+            parsers: Parser of the value, by key.
             required: Keys that may not be missing.
         """
         members = self.members()
         for key, entry in members.items():
             if key not in parsers:
-                remedy = f"{did_you_mean(key, parsers)}Known are {', '.join(parsers)}."
+                remedy = f"{did_you_mean(key, parsers)}Available: {', '.join(parsers)}."
                 raise entry.fault("there is no such key", remedy)
         for key in required:
             if key not in members:
@@ -212,8 +212,8 @@ class Entry:
         """A list of so many finite numbers, or of any number of them.
 
         Args:
-            count: How many; None allows any number.
-            read: What reads each of them, such as ``Entry.positive``; by default ``Entry.number``.
+            count: Length of the list; None allows any.
+            read: Parser of each of them, such as ``Entry.positive``; by default ``Entry.number``.
         """
         items = self.items()
         if count is not None and len(items) != count:
@@ -276,7 +276,7 @@ class Entry:
             if choice == self.value:
                 return choice
         raise self.fault(
-            f"{shown(self.value)} is not known", f"Known are {', '.join(map(str, choices))}."
+            f"{shown(self.value)} is not known", f"Available: {', '.join(map(str, choices))}."
         )
 
     def texts(self) -> tuple[str, ...]:
@@ -317,7 +317,7 @@ def parsed_yaml(text: str, largest: int = LARGEST_DOCUMENT, aliases: bool = Fals
     Args:
         text: The text.
         largest: Characters that it may have.
-        aliases: Whether it may use aliases, as programs write them; whoever goes through all of it
+        aliases: True if it may use aliases, as programs write them; whoever goes through all of it
             may then find far more than was written.
 
     Raises:
@@ -361,7 +361,7 @@ def packaged_or_own(name: str | Path, files: Mapping[str, Path], kind: str) -> P
     Args:
         name: Name of a packaged file, or the path of one of the user's own.
         files: The packaged ones, by name.
-        kind: What they are, such as "sensor", for the message.
+        kind: Kind of document, such as "sensor", for the message.
 
     Raises:
         InputError: There is no such file.

@@ -1,4 +1,4 @@
-"""Where a sensor is mounted: what takes its points into another sensor's frame."""
+"""The mounting of a sensor: the transform of its points into another sensor's frame."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,7 +45,7 @@ class Extrinsics:
         """Takes points of a sensor into the frame in which the sensor has a pose.
 
         Args:
-            x: Where the sensor is: ahead, metres.
+            x: Position of the sensor: ahead, metres.
             y: To the left, metres.
             z: Above, metres.
             roll: Turn about its x axis, degrees, applied first.

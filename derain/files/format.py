@@ -1,4 +1,4 @@
-"""What a format of scan files is, and all that there are."""
+"""The base class of formats of scan files, and their registry."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -27,12 +27,12 @@ class Format(ABC):
         mine = "my_package.my_format"
 
     Attributes:
-        HELP: What it is, for ``derain info --formats``.
-        UNNAMED: Which of its files do not name their columns, for the help of ``--columns``; empty
-            where every file does.
-        DAMAGE: What :meth:`decode` raises, besides InputError, on content that it cannot read.
-        EXTRA: What must be installed for it besides what derain always needs, if anything.
-        RECORD: How likely such a file is no scan but a record of something else, such as of poses:
+        HELP: Description, for ``derain info --formats``.
+        UNNAMED: Those of its files that do not name their columns, for the help of ``--columns``;
+            empty if every file does.
+        DAMAGE: Exceptions of :meth:`decode`, besides InputError, on content that it cannot read.
+        EXTRA: Extra that must be installed for it, if any.
+        RECORD: Likelihood that such a file is a record of something else, such as of poses:
             of a folder's files those of the lowest number are its scans.
     """
 
@@ -68,7 +68,7 @@ class Format(ABC):
         """
 
     def names_columns(self, scan: Scan) -> bool:
-        """Whether a file that a scan is written to names its columns.
+        """True if a file that a scan is written to names its columns.
 
         A further column in one that does not would be taken for something else by who reads it.
         """
@@ -101,6 +101,6 @@ def format_of(path: Path) -> Format:
         raise InputError(
             path,
             f"'{suffix}' is not the suffix of a scan",
-            f"Known are {', '.join(FORMATS)}, and each of them with .gz.",
+            f"Available: {', '.join(FORMATS)}, and each of them with .gz.",
         )
     return FORMATS[suffix]()

@@ -1,4 +1,4 @@
-"""When the scans of a folder were taken: its ``metadata.csv``, which REHEARSE-3D has as well."""
+"""Times of the scans of a folder: its ``metadata.csv``, which REHEARSE-3D has as well."""
 
 import csv
 import io
@@ -61,7 +61,7 @@ def read_frame_times(
 
 
 def _lines(path: Path, columns: Sequence[str]) -> Iterator[list[str]]:
-    """What every line has in some columns."""
+    """Values of some columns, line by line."""
     with reading(path, ValueError, csv.Error):
         text = read_bytes(path, LARGEST_METADATA).decode("utf-8-sig")
         lines = csv.DictReader(io.StringIO(text, newline=""), restval="", skipinitialspace=True)

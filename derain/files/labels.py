@@ -20,7 +20,7 @@ LABEL = ".label"
 
 
 def label_beside(scan: Path) -> Path:
-    """Where a scan's labels lie: beside it if they are there, else in the sibling `labels`."""
+    """Path of a scan's labels: beside it if they are there, else in the sibling `labels`."""
     label = beside(scan, LABEL)
     # Not Path.is_file, which raises where the name has become too long by its suffix.
     # The folder above the scan's, also where the scan is named from within its own.

@@ -24,7 +24,7 @@ def beside(scan: Path, suffix: str) -> Path:
 
 
 def is_compressed(scan: Path) -> bool:
-    """Whether the file is compressed as a whole."""
+    """True if the file is compressed as a whole."""
     return scan.suffix.lower() == COMPRESSED
 
 

@@ -1,4 +1,4 @@
-"""Reading a file, with one error for whatever is wrong with it."""
+"""Reads a file; any fault is one InputError."""
 
 import stat
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ def reading(path: Path, *damage: type[Exception]) -> Iterator[None]:
 
     Args:
         path: The file that the block reads.
-        damage: What the format's library raises on content that it cannot read.
+        damage: Exceptions of the format's library on damaged content.
 
     Raises:
         InputError: The file is missing, cannot be opened, is damaged, or needs more memory than
@@ -47,7 +47,7 @@ def reading(path: Path, *damage: type[Exception]) -> Iterator[None]:
         ) from error
     except MemoryError as error:
         raise InputError(
-            path, "needs more memory than there is", "Cut it into smaller scans."
+            path, "needs more memory than is available", "Cut it into smaller scans."
         ) from error
 
 
@@ -97,7 +97,7 @@ def stamp_of(path: Path) -> str:
 
 
 def is_file(path: Path) -> bool:
-    """Whether there is such a file.
+    """True if there is such a file.
 
     Raises:
         InputError: That cannot be known: a name longer than any file's, or a folder that may not be

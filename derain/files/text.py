@@ -1,4 +1,4 @@
-"""What formats with a text header share: names in any encoding, and points as lines of numbers."""
+"""Shared parts of formats with a text header: names in any encoding, points as lines of numbers."""
 
 import io
 import math
@@ -18,7 +18,7 @@ _DECIMALS = {"f4": "%.9g", "f8": "%.17g"}
 
 
 def decode(line: bytes) -> str:
-    """Text of a header; `encode` gives back the same bytes, whatever their encoding is."""
+    """Text of a header, in any encoding; `encode` returns the same bytes."""
     return line.decode("utf-8", "surrogateescape")
 
 

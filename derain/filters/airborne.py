@@ -1,4 +1,4 @@
-"""What is known of a scan's rain before any point is judged: how bright it is, and how far."""
+"""Estimates of a scan's rain before any point is judged: its brightness and its range."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -43,7 +43,7 @@ class RainBounds:
 
     Attributes:
         intensity: Bound of its intensity, in the scan's own unit.
-        is_bright: Whether rain is above that bound; else it is at most so bright.
+        is_bright: True if rain is above that bound; else it is at or below it.
         range: Distance that it is within, metres.
     """
 
@@ -89,8 +89,8 @@ def fit_rain_bounds(
         intensity: Their intensities, float32 (M,); not numbers where the scan has none.
         may_be: Points that may be rain, such as those above the ground, bool (M,).
         around: Finds neighbourhoods.
-        sparseness: How many times as far as usual the neighbours of a sparse point are.
-        reach: How many times as far as most of the sample rain may be.
+        sparseness: Distance of a sparse point's neighbours, as a multiple of the usual one.
+        reach: Largest range of rain, as a multiple of the range of most of the sample.
 
     Returns:
         The bounds; None where no intensity was measured, nothing is in the air, or what is differs
@@ -118,7 +118,7 @@ def _is_airborne(
     neighbourhoods: tuple[NDArray[np.int64], NDArray[np.float32]],
     sparseness: float,
 ) -> NDArray[np.bool_]:
-    """Which neighbourhoods are scattered through space and sparse, bool (Q,)."""
+    """True for neighbourhoods that are scattered through space and sparse, bool (Q,)."""
     neighbours, distances = neighbourhoods
     spacing = distances.T.astype(np.float64).mean(axis=0) / distance
     sparse = spacing > sparseness * np.median(spacing)
@@ -133,7 +133,7 @@ def _greatest_difference(
 
     Args:
         intensity: Intensities, float32 (Q,).
-        airborne: Which of the points are in the air, bool (Q,); some are, and some are not.
+        airborne: True for points in the air, bool (Q,); some are, and some are not.
 
     Returns:
         The bound, whether what is in the air is brighter than it, and by how much the shares beyond

@@ -45,7 +45,7 @@ FEWEST_NEIGHBOURS = 4
 @FILTERS.add("crf")
 @dataclass(frozen=True)
 class CRF(PointFilter):
-    """Calls a point rain by its neighbourhood, and by what it calls the points around it.
+    """Classifies each point by its neighbourhood, and by the classes of the points around it.
 
     Only candidates may be rain: near, above the ground, and as bright as rain is. Of each of them
 
@@ -153,13 +153,13 @@ class CRF(PointFilter):
         return rain, inverse
 
     def issues(self, scan: Scan) -> Iterator[ScanIssue]:
-        """What is odd about a scan: no intensity, or another unit than the published bound's."""
+        """Warnings about a scan: no intensity, or another unit than the published bound's."""
         yield from missing_intensity(scan)
         if self.variant == "published":
             yield from intensity_of_another_scale(scan, self.FULL_SCALE, self.name)
 
     def _rain(self, points: NDArray[np.float32], around: Around) -> NDArray[np.bool_]:
-        """Which points are rain, bool (M,).
+        """True for points that are rain, bool (M,).
 
         Args:
             points: Distinct x, y and z in metres along a Morton curve, and intensity,
@@ -187,7 +187,7 @@ class CRF(PointFilter):
         distance: NDArray[np.float64],
         around: Around,
     ) -> NDArray[np.bool_]:
-        """Which points may be rain, bool (M,)."""
+        """True for points that may be rain, bool (M,)."""
         if self.variant == "published":
             is_near = (distance <= self.range) & (xyz[:, 2] >= -self.sensor_height)
             return is_near & (intensity <= self.intensity)

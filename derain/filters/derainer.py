@@ -109,11 +109,11 @@ class FilterDerainer(Method):
 
     @property
     def waiting(self) -> int:
-        """How many frames were pushed and not answered for: none, a filter sees one at a time."""
+        """Number of frames that were pushed and not answered: none, a filter sees one at a time."""
         return 0
 
     def starts_new_recording(self, frame: Frame) -> bool:
-        """Whether pushing a frame would let go of those that wait: none do."""
+        """True if pushing a frame would drop those that wait: always False."""
         return False
 
     def push(
@@ -140,7 +140,7 @@ class FilterDerainer(Method):
         return iter(())
 
     def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
-        """What is odd about a scan for the filter, or for whatever looks at places."""
+        """Warnings about a scan for the filter, or for any method that uses places."""
         yield from viewpoint_issues(judgement.scan)
         yield from self.filter.issues(judgement.scan)
 

@@ -60,7 +60,7 @@ class Ground:
     offset: float
 
     def is_above(self, xyz: NDArray[np.floating[Any]]) -> NDArray[np.bool_]:
-        """True for points that stand out of the ground, bool (M,).
+        """True for points above the ground, bool (M,).
 
         Args:
             xyz: Coordinates, (M, 3), metres, sensor frame.

@@ -1,4 +1,4 @@
-"""What every filter is: a few numbers, and a verdict on each point from its neighbourhood."""
+"""The base class of filters: a few parameters, and a verdict on each point by its neighbourhood."""
 
 import math
 from abc import ABC, abstractmethod
@@ -63,7 +63,7 @@ class PointFilter(ABC):
                 return np.linalg.norm(view.points[:, :3], axis=1) < self.reach
 
     Attributes:
-        HELP: What rain is to the filter, in one line for the help of commands.
+        HELP: The filter's definition of rain, in one line for the help of commands.
         SPACE: Where each parameter is looked for by ``derain tune``; those not named stay as they
             are by default. Whole numbers are drawn evenly, all else evenly in its logarithm: what
             fits one sensor may be a tenth of what fits another. A filter without any is not tuned.
@@ -88,7 +88,7 @@ class PointFilter(ABC):
 
     @property
     def name(self) -> str:
-        """What the filter is registered by; of one that is not, the name of its class."""
+        """The registered name of the filter; if there is none, the name of its class."""
         return FILTERS.name_of(type(self)) or type(self).__name__.lower()
 
     @abstractmethod
@@ -127,7 +127,7 @@ class PointFilter(ABC):
             return rain_among(self, view, scan, candidates), view.inverse
 
     def issues(self, scan: Scan) -> Iterator[ScanIssue]:
-        """What is odd about a scan for this filter; nothing, for one that looks at places alone.
+        """Warnings about a scan for this filter; nothing, for one that looks at places alone.
 
         Args:
             scan: The scan, before it is judged.
@@ -156,7 +156,7 @@ def filter_from(name: str, parameters: Mapping[str, Any]) -> PointFilter:
 
 
 def filter_view(neighbours: int, threads: int = 0) -> NeighbourView:
-    """How filters see a scan.
+    """The view of a scan for filters.
 
     One view serves several filters: each looks at no more than its own number of neighbours.
 
@@ -173,14 +173,14 @@ def filter_view(neighbours: int, threads: int = 0) -> NeighbourView:
 def rain_among(
     filter: PointFilter, view: Neighbourhoods, scan: Scan, candidates: Candidates | None
 ) -> NDArray[np.bool_]:
-    """What a filter calls rain among candidates.
+    """The points that a filter calls rain among candidates.
 
     A filter looks at all points to find what is usual, whether or not they are candidates. So its
     verdict on a candidate is that without bounds.
 
     Args:
         filter: The filter.
-        view: What it sees of the scan, M points.
+        view: View of the scan, M points.
         scan: The scan.
         candidates: Bounds outside which nothing is rain; None where anything may be.
 
@@ -203,7 +203,7 @@ def rows_of(points: NDArray[np.bool_], inverse: NDArray[np.int64]) -> NDArray[np
 
 
 def _remedy(parameter: Field[Any], value: Any) -> str | None:
-    """What to give in place of a value that a parameter cannot have; None where it can."""
+    """The remedy for an impossible value of a parameter; None if the value is possible."""
     is_number = isinstance(value, Real) and not isinstance(value, bool)
     if parameter.name == "neighbours":
         is_whole = is_number and isinstance(value, Integral)

@@ -185,7 +185,7 @@ def has_few_neighbours(
     radius: NDArray[np.float64],
     count: int,
     threads: int,
-    asked: NDArray[np.bool_] | None = None,
+    queried: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.bool_]:
     """Finds the points that have fewer than ``count`` points within their radius.
 
@@ -194,13 +194,13 @@ def has_few_neighbours(
         radius: Metres, float64 (M,); a point at exactly this distance is within.
         count: Number of points, the point itself included.
         threads: Threads of the search.
-        asked: Points that are asked about, bool (M,); None for all.
+        queried: Points to judge, bool (M,); None for all.
 
     Returns:
-        bool (M,), False for points that are not asked about; the same in whatever order the points
+        bool (M,), False for points that are not queried; the same in whatever order the points
         are, but sooner along a curve.
     """
-    few = np.ones(len(xyz), bool) if asked is None else asked.copy()
+    few = np.ones(len(xyz), bool) if queried is None else queried.copy()
     if len(xyz) < count or not few.any():
         return few
     places = xyz.astype(np.float64)

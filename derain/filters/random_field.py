@@ -27,7 +27,7 @@ def decide_sequentially(
     at distances d. A neighbour's v is ``vote`` where it is rain and -``vote`` where it is not, as
     far as its feature or an earlier decision shows; else it is its feature.
 
-    All that may be rain is taken for it first. Then what must turn is turned, wave by wave. A turn
+    All points that may be rain start as rain. Then points turn, wave by wave. A turn
     bears on later points alone, and makes none of them rain; so the waves end where a loop over
     the points in their order would. Most points are decided once, whatever their neighbours are.
 
@@ -71,23 +71,23 @@ def _turn_in_waves(
     at_least: NDArray[np.float64],
     dependents: "_Dependents",
 ) -> None:
-    """Turns what is taken for rain and is none, until nothing turns any more.
+    """Turns points from rain to not rain, until none turns any more.
 
     Args:
-        is_rain: What the U uncertain points are taken for, bool (U,); decided in place.
+        is_rain: Current state of the U uncertain points, bool (U,); decided in place.
         open_: Numbers of the H points whose verdicts are open, int64 (H,).
         own: Their features, float64 (H,).
         votes: The votes for them while all before them are rain, float64 (k - 1, H); changed in
             place.
         at_least: The votes for them where none before them is, float64 (k - 1, H).
-        dependents: Which of them hear of whose decision.
+        dependents: Points that depend on each decision.
     """
     turned = np.flatnonzero(~is_rain)
     while len(turned):
         column, dependent = dependents.of(turned)
         votes[column, dependent] = at_least[column, dependent]
-        asked = np.unique(dependent[is_rain[open_[dependent]]])
-        turned = open_[asked[_total(own[asked], votes[:, asked]) <= 0]]
+        affected = np.unique(dependent[is_rain[open_[dependent]]])
+        turned = open_[affected[_total(own[affected], votes[:, affected]) <= 0]]
         is_rain[turned] = False
 
 
@@ -119,7 +119,7 @@ class _Dependents:
 
     Args:
         neighbours: Numbers of the neighbours of each of H hearers, int64 (k - 1, H).
-        is_earlier: Which of these are uncertain and judged before it, bool (k - 1, H).
+        is_earlier: True for those that are uncertain and judged before it, bool (k - 1, H).
         uncertain: U.
     """
 

@@ -39,7 +39,7 @@ class SSR(PointFilter):
         its norm after a Fourier transform is √k times that before.
     """
 
-    HELP: ClassVar[str] = "rain is dim, as are its neighbours, for how far apart they lie"
+    HELP: ClassVar[str] = "rain is dim, and so are its neighbours, in relation to their distances"
     SPACE: ClassVar[Mapping[str, Span]] = {
         "neighbours": TUNED_NEIGHBOURS,
         "threshold": (0.01, 1e6),
@@ -65,6 +65,6 @@ class SSR(PointFilter):
         return math.sqrt(k) * np.sqrt(energy) < self.threshold
 
     def issues(self, scan: Scan) -> Iterator[ScanIssue]:
-        """What is odd about a scan: no intensity, or one in another unit than the threshold's."""
+        """Warnings about a scan: no intensity, or one in another unit than the threshold's."""
         yield from missing_intensity(scan)
         yield from intensity_of_another_scale(scan, self.FULL_SCALE, self.name)

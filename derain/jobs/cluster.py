@@ -77,7 +77,7 @@ def version() -> str:
 def _refuse_other_versions(client: Any) -> None:
     """Refuses workers on which derain is another one than here, or none.
 
-    Those that come later are asked with their first unit.
+    Workers that join later are checked with their first unit.
     """
     try:
         versions = set(client.run(version).values())

@@ -27,13 +27,13 @@ UnitT = TypeVar("UnitT", bound=Unit)
 
 @dataclass(frozen=True)
 class Job:
-    """What is done in a folder, and by which options.
+    """The work done in a folder, and its options.
 
     Attributes:
         folder: The folder of the results, a path or a URL.
         options: Texts, numbers, true or false by name, among them the command and derain's version:
             all of what the results depend on but the inputs.
-        shards: How many shards it was begun in, and what a batch system calls the first of them;
+        shards: Number of shards that it was started in, and a batch system's number of the first;
             None where it was begun as a whole.
     """
 
@@ -50,14 +50,14 @@ class Job:
         shard: Shard | None = None,
         anew: bool = False,
     ) -> Self:
-        """Begins a job, or goes on with the one of the folder.
+        """Starts a job, or resumes the one of the folder.
 
         Args:
             folder: The folder of the results, made if missing.
             options: The options.
             units: All of its units, which are listed for :meth:`listed`.
             shard: The shard that is done now; None for all of it.
-            anew: Whether the records of another job are removed; its results stay until they are
+            anew: True if the records of another job are removed; its results stay until they are
                 written anew.
 
         Raises:
@@ -92,7 +92,7 @@ class Job:
             raise InputError(
                 named,
                 "holds no records of a job",
-                "Name the folder that --out named, of a run over several recordings.",
+                "Name the --out folder of a run over several recordings.",
             )
         try:
             read = json.loads(content)
@@ -100,11 +100,11 @@ class Job:
             return cls(folder, dict(read["options"]), None if shards is None else tuple(shards))
         except (ValueError, KeyError, TypeError) as error:
             reason = f"the options that it was begun by, {FOLDER}/{JOB}, are damaged"
-            raise InputError(named, reason, "Have everything done again by --anew.") from error
+            raise InputError(named, reason, "Do everything again with --anew.") from error
 
     @staticmethod
     def is_begun(folder: Place) -> bool:
-        """Whether a folder has a job."""
+        """True if a folder has a job."""
         return documents_at(folder, FOLDER).read(JOB) is not None
 
     @cached_property
@@ -135,8 +135,8 @@ class Job:
                 raise
             raise InputError(
                 without_secrets(str(self.folder)),
-                "was begun, and its units are not listed",
-                "Run the command again that began it.",
+                "was started, but its units are not listed yet",
+                "Run the command that started it again.",
             ) from error
 
     def record(self, record: Record) -> None:
@@ -173,18 +173,18 @@ class Job:
         return documents_at(self.folder, FOLDER)
 
     def _refuse_other(self, begun: "Job") -> None:
-        """Refuses to go on with a job that was begun by other options."""
+        """Refuses to resume a job that was started with other options."""
         if changed := differences(begun.options, self.options):
             raise InputError(
                 without_secrets(str(self.folder)),
-                f"was begun by other options: {changed}",
-                "Give --out another folder, or --anew to have all of it done again.",
+                f"was started with other options: {changed}",
+                "Give --out another folder, or --anew to do all of it again.",
             )
 
 
 @dataclass(frozen=True)
 class JobStatus:
-    """How far a job is.
+    """The progress of a job.
 
     Attributes:
         job: The job.
@@ -260,7 +260,7 @@ def _name(unit: str) -> str:
 
 
 def _parsed(content: bytes | None) -> Any:
-    """What a document holds; None where it is not there, or damaged."""
+    """The content of a document; None if it is missing or damaged."""
     with suppress(ValueError):
         return None if content is None else json.loads(content)
     return None

@@ -36,12 +36,12 @@ class Submits(Protocol):
     What ``submit`` returns needs ``result()`` and ``done()``.
     """
 
-    def submit(self, work: Callable[..., Any], /, *given: Any) -> Any:
+    def submit(self, work: Callable[..., Any], /, *args: Any) -> Any:
         """Has work done, now or later, here or elsewhere."""
 
 
 class Result(Protocol):
-    """What came of a unit, or of a part of it."""
+    """The result of a unit, or of a part of it."""
 
     @property
     def error(self) -> InputError | None:
@@ -59,11 +59,11 @@ IsThere = Callable[[UnitT, list[ResultT]], bool]
 
 
 class Work(ABC, Generic[UnitT, ResultT]):
-    """What is done of each unit. It is pickled once a job, and each thread keeps its last one."""
+    """The work for each unit. It is pickled once per job, and each thread keeps its last one."""
 
     @abstractmethod
     def do(self, unit: UnitT) -> Iterator[ResultT]:
-        """Does a unit and yields its results; what it writes is complete when it ends.
+        """Does a unit and yields its results; its files are complete at the end.
 
         Raises:
             InputError: The whole unit fails.
@@ -78,11 +78,11 @@ class Work(ABC, Generic[UnitT, ResultT]):
         """A result from its record."""
 
     def look(self) -> IsThere[UnitT, ResultT]:
-        """Looks at what is written by now; of work that writes nothing, all is there."""
+        """Checks the written results; work that writes nothing is always complete."""
         return lambda unit, results: True
 
     def check(self) -> None:
-        """Refuses a process where the results would be others than where the job began.
+        """Refuses a process whose results would differ from those where the job began.
 
         Raises:
             InputError: For instance because a file has another content there.
@@ -95,7 +95,7 @@ class Value:
 
     Attributes:
         content: The result, of primitives of JSON.
-        error: Why there is none.
+        error: Reason for a missing result.
     """
 
     content: Any = None
@@ -132,11 +132,11 @@ class ValueWork(Work[UnitT, Value]):
 
 @dataclass(frozen=True)
 class Task(Generic[UnitT, ResultT]):
-    """What a process does of the units of a job, with a record of each.
+    """The part of a job that one process does, with a record of each unit.
 
     Attributes:
         job: The job; None keeps no records.
-        work: What is done.
+        work: The work for each unit.
         folder: The folder that relative paths begin in; None where there are none.
         version: The version of derain that began it.
     """
@@ -222,7 +222,7 @@ class UnitResult(Generic[UnitT, ResultT]):
     Attributes:
         unit: The unit that it is of.
         result: The result.
-        before: Whether an earlier command had it.
+        before: True if an earlier command had it.
     """
 
     unit: UnitT
@@ -238,9 +238,9 @@ def run(
     """Does the units of a job that are not done.
 
     Args:
-        task: What is done of each.
+        task: Work for each unit.
         units: The units.
-        executor: What does them; None does one after the other in this process.
+        executor: Executor of the units; None does one after the other in this process.
 
     Yields:
         Each result, in the order of the units, as soon as it and all before it are known.
@@ -257,10 +257,10 @@ def run(
 
 
 def completed(task: Task[UnitT, ResultT], units: Sequence[UnitT]) -> list[ResultT] | None:
-    """The results of all units of a job, whoever did them; None while one is to be done.
+    """The results of all units of a job, from all processes; None while one is missing.
 
     Args:
-        task: What is done of each.
+        task: Work for each unit.
         units: All units of the job.
     """
     results: list[ResultT] = []
@@ -284,12 +284,12 @@ def values(
     Where records are kept, a unit that fails does not stop the others.
 
     Args:
-        task: What is done of each.
+        task: Work for each unit.
         units: All units of the job.
         shard: Those that are done now.
-        executor: What does them; None does one after the other in this process.
-        doing: What a progress bar calls it, such as "counting".
-        unit: What a unit is.
+        executor: Executor of the units; None does one after the other in this process.
+        doing: Its title in a progress bar, such as "counting".
+        unit: Name of a unit in messages.
 
     Returns:
         The results, in the order of the units; None while other shards are to be done.
@@ -312,7 +312,7 @@ def values(
         raise InputError(
             failures[0].subject,
             f"{failures[0].reason}, so that {len(failures):,} of {len(shard):,} {unit}s failed",
-            f"{failures[0].remedy} The same command goes on with them.",
+            f"{failures[0].remedy} The same command retries them.",
         )
     if len(shard) == len(units):
         return found
@@ -355,7 +355,7 @@ def _awaited(task: Task[UnitT, ResultT], unit: UnitT, future: Any) -> Sequence[R
         raise InputError(
             "executor",
             f"it ended before {unit.id} was done ({error or type(error).__name__})",
-            "Run the same command again: it goes on with what is not done.",
+            "Run the same command again: it does the remaining units.",
         ) from error
     except UnfitWorkerError:
         raise

@@ -23,10 +23,10 @@ class Shard:
     """One of the shards of a job.
 
     Attributes:
-        number: Which, from 0.
-        count: How many there are.
-        first: What a batch system calls the first of them.
-        of_array: Whether it is a task of a batch system's array.
+        number: Number of the shard, from 0.
+        count: Their number.
+        first: A batch system's number of the first shard.
+        of_array: True if it is a task of a batch system's array.
 
     Raises:
         InputError: No such shard.
@@ -49,7 +49,7 @@ class Shard:
 
     @classmethod
     def of_text(cls, text: str) -> Self:
-        """The shard that ``I/N`` names, the first of which is 0/N.
+        """Parses ``I/N``; the first shard is 0/N.
 
         Raises:
             ValueError: Other text.
@@ -75,7 +75,7 @@ class Shard:
         A batch system that runs some tasks of an array again counts these alone.
 
         Args:
-            begun: How many shards there were, and what the first was called; None for none.
+            begun: Number of shards, and the number of the first; None for none.
         """
         if begun is None or not self.of_array:
             return self
@@ -96,7 +96,7 @@ def shard_numbers(units: Sequence[Unit], count: int) -> dict[str, int]:
 
     Args:
         units: The units.
-        count: How many shards there are.
+        count: Number of shards.
 
     Returns:
         Number of the shard, from 0, by the id of each unit.

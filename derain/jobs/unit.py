@@ -13,8 +13,8 @@ class Unit:
     Attributes:
         id: Its relative path, such as ``03/velodyne/000050``, which no other unit of the job has
             and which does not depend on the others.
-        size: Bytes of what it reads, or whatever else its time grows with.
-        inputs: Fingerprint of what it reads, by sizes and times of change.
+        size: Bytes of its inputs, or another measure that its time grows with.
+        inputs: Fingerprint of its inputs, by sizes and times of change.
     """
 
     id: str
@@ -24,17 +24,17 @@ class Unit:
 
 @dataclass(frozen=True)
 class Record:
-    """What was done of a unit.
+    """The record of a unit's work.
 
     Attributes:
         unit: Id of the unit.
-        inputs: Fingerprint of what it read.
+        inputs: Fingerprint of its inputs.
         options: Fingerprint of the options of its job.
         worker: Host and number of the process.
-        ended: When it ended, in ISO 8601, by the clock of its worker.
-        seconds: How long it took.
-        errors: What went wrong, as subject, reason and remedy each; empty where nothing did.
-        results: What came of it, as the job writes it.
+        ended: Its end, in ISO 8601, by the clock of its worker.
+        seconds: Duration, seconds.
+        errors: Errors, with subject, reason and remedy each; empty without errors.
+        results: Results, in the form of the job.
     """
 
     unit: str
@@ -48,5 +48,5 @@ class Record:
 
     @property
     def failures(self) -> list[InputError]:
-        """What went wrong."""
+        """The failures of the unit."""
         return [InputError(*error) for error in self.errors]

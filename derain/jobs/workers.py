@@ -1,4 +1,4 @@
-"""Processes of this machine that do units, and what becomes of a unit whose process dies."""
+"""Worker processes of this machine, which repeat a task whose process dies."""
 
 import multiprocessing
 import pickle
@@ -15,7 +15,7 @@ from derain.errors import InputError
 from derain.system.memory import keep_freed_memory
 from derain.system.workers import end_with_parent, without_main_module
 
-# A unit is tried so often while its process dies.
+# Times that a task is tried while its process dies.
 TRIES = 3
 
 Result = TypeVar("Result")
@@ -26,7 +26,7 @@ def processes(count: int) -> Iterator["WorkerPool | None"]:
     """Lends processes of this machine as an executor; None for one, which is this process.
 
     Args:
-        count: How many.
+        count: Number of processes.
     """
     if count == 1:
         yield None
@@ -36,12 +36,12 @@ def processes(count: int) -> Iterator["WorkerPool | None"]:
 
 
 class WorkerPool(ThreadPoolExecutor):
-    """Processes of this machine, each of which does one piece of work after the other.
+    """Processes of this machine, each of which runs one task after the other.
 
-    Where a process dies, for instance because memory is full, a new one does its work again. Work
-    whose process always dies fails with an InputError, and the other work goes on.
+    If a process dies, for instance because memory is full, a new one runs its task again. A task
+    whose process always dies fails with an InputError, and the other tasks go on.
 
-    A ``with`` block ends them: after an error at once, otherwise when all work is done.
+    A ``with`` block ends the processes: after an error at once, otherwise when all tasks are done.
 
     Args:
         workers: Number of processes.
@@ -55,9 +55,9 @@ class WorkerPool(ThreadPoolExecutor):
             self._idle.put(worker)
         self._ended = False
 
-    def submit(self, work: Callable[..., Result], /, *given: Any, **named: Any) -> Future[Result]:
-        """Has work done by the next process that is idle."""
-        return super().submit(self._done, pickle.dumps((work, given, named)))
+    def submit(self, work: Callable[..., Result], /, *args: Any, **kwargs: Any) -> Future[Result]:
+        """Runs a function in the next process that is idle."""
+        return super().submit(self._run, pickle.dumps((work, args, kwargs)))
 
     def __enter__(self) -> Self:
         return self
@@ -74,7 +74,7 @@ class WorkerPool(ThreadPoolExecutor):
         for worker in self._workers:
             worker.kill()
 
-    def _done(self, task: bytes) -> Any:
+    def _run(self, task: bytes) -> Any:
         """Waits for a process and for its answer, in a thread of this process."""
         worker = self._idle.get()
         try:
@@ -82,7 +82,7 @@ class WorkerPool(ThreadPoolExecutor):
                 if self._ended:
                     raise CancelledError
                 try:
-                    succeeded, answer = worker.ask(task)
+                    succeeded, answer = worker.run(task)
                 except (EOFError, OSError):
                     worker.kill()
                     continue
@@ -96,26 +96,26 @@ class WorkerPool(ThreadPoolExecutor):
         raise InputError(
             "worker",
             f"its process died {TRIES} times",
-            "See whether memory is full; fewer --workers need less.",
+            "Check whether the memory is full; fewer --workers need less.",
         )
 
 
 class _Worker:
-    """A process that is started with its first work, and again after it died."""
+    """A process that is started with its first task, and again after it died."""
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()  # a pool kills from another thread than it asks from
+        self._lock = threading.Lock()  # a pool kills from another thread than it runs tasks from
         self._process: multiprocessing.process.BaseProcess | None = None
         self._connection: Connection[Any, Any] | None = None
 
-    def ask(self, task: bytes) -> tuple[bool, Any]:
-        """Has the process do something.
+    def run(self, task: bytes) -> tuple[bool, Any]:
+        """Sends a task to the process, and waits for its answer.
 
         Args:
-            task: What to call, its arguments and those with names, pickled.
+            task: A function, its arguments and its keyword arguments, pickled.
 
         Returns:
-            Whether it succeeded, and what it returned or raised.
+            True if it succeeded, and the value that it returned or raised.
 
         Raises:
             EOFError: The process died.
@@ -147,19 +147,19 @@ class _Worker:
 
 
 def _serve(connection: "Connection[Any, Any]") -> None:
-    """Does what it is asked for until its process is killed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal: whoever began this ends it
+    """Runs tasks until its process is killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal: the parent process ends this one
     end_with_parent()
     keep_freed_memory()
     while True:
         try:
             task = connection.recv_bytes()
-        except EOFError:  # the process that asks has ended
+        except EOFError:  # the parent process has ended
             return
         answer: tuple[bool, Any]
         try:
-            work, given, named = pickle.loads(task)
-            answer = True, work(*given, **named)
+            work, args, kwargs = pickle.loads(task)
+            answer = True, work(*args, **kwargs)
         except Exception as error:
             answer = False, error
         try:

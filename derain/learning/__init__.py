@@ -1,1 +1,1 @@
-"""What training is made of: batches, losses, and what is drawn at random."""
+"""The parts of training: batches, losses, and random draws."""

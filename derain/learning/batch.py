@@ -23,10 +23,10 @@ class Sample:
         scan: The whole scan, with its labels where they are known.
         view: The network's view of it.
         target: The class of each of its cells, int64 (M,); None without labels.
-        measured: Whether the network's answers are counted or written: not in training, nor of a
+        measured: True if the network's answers are counted or written: not in training, nor of a
             scan that is only read again so that all processes take as many steps.
-        key: What is made of the scan is named by this: the key of its frame.
-        milliseconds: How long it took to make, by ``READ`` and ``VIEW``, wall time.
+        key: Name of results of the scan: the key of its frame.
+        milliseconds: Time to make it, by ``READ`` and ``VIEW``, wall time.
     """
 
     scan: Scan
@@ -42,7 +42,7 @@ class Sample:
     ) -> "Sample":
         """Gives a view its target, by the labels of its scan if there are any.
 
-        Cells of points of which it is not known whether they are rain are not judged.
+        Cells of points of unknown class are not judged.
         """
         if scan.label is None:
             return cls(scan, view, None, measured, key)
@@ -53,12 +53,12 @@ class Sample:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredScan:
-    """What is needed of a scan once the network has scored it.
+    """The data of a scan that are needed after the network has scored it.
 
     Attributes:
         scan: The whole scan, with its labels where they are known.
         back_projection: Carries scores of its cells to its rows.
-        key: What is made of the scan is named by this.
+        key: Name of results of the scan.
     """
 
     scan: Scan
@@ -73,10 +73,10 @@ class Batch:
     Attributes:
         inputs: The network's inputs by name, scans one after the other.
         target: The class of each cell, int64 (M,); None without labels.
-        cells: How many cells each scan has, in order.
+        cells: Number of cells of each scan, in order.
         measured: The scans, in order, where the network's answers are counted or written;
             else none, so that no worker sends what nobody needs.
-        milliseconds: How long its scans took to make, one after the other, by ``READ`` and
+        milliseconds: Time to make its scans, one after the other, by ``READ`` and
             ``VIEW``, wall time of the process that made them.
     """
 

@@ -1,4 +1,4 @@
-"""What a supervised derainer learns from: weighted cross-entropy and the Lovász-softmax loss.
+"""Losses of supervised derainers: weighted cross-entropy and the Lovász-softmax loss.
 
 Losses take one row for each point. Of an image, take its valid pixels:
 ``logits.movedim(1, -1)[valid]``. Each loss has a defined, finite value and gradient for every scan:
@@ -101,14 +101,14 @@ def _weighted_mean(weighted: Tensor, weight: Tensor) -> Tensor:
 
 
 def _jaccard_steps(foreground: Tensor, dtype: torch.dtype) -> Tensor:
-    """How much the Jaccard loss grows with each point, as one after another is counted as wrong.
+    """Increase of the Jaccard loss with each point, as points are counted as wrong one by one.
 
     With the first i points wrong, the loss is 1 − intersection / union. A foreground point takes
     one from the intersection, any other adds one to the union. Both differences are written out:
     subtracting neighbouring losses would cancel all but a few digits in a scan of 400,000 points.
 
     Args:
-        foreground: Which points are of the class, those with the largest error first, bool
+        foreground: True for points of the class, those with the largest error first, bool
             (N, ...), for one class or for several.
         dtype: Floating-point type of the result.
 

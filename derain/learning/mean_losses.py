@@ -28,8 +28,8 @@ class MeanLosses(Metric):
 
         Args:
             losses: Scalars by name, the same names at every call and in every process.
-            scans: How many scans of the batch count. A batch with none does not change the means;
-                a process that has no other learns the names of the losses from it.
+            scans: Number of scans of the batch that count. A batch with none does not change the
+                means; a process that has no other learns the names of the losses from it.
         """
         self.names = tuple(losses)
         row = torch.stack([loss.detach().float() for loss in losses.values()])

@@ -1,4 +1,4 @@
-"""Where the randomness of a training comes from: the run's seed, the epoch, and what is drawn.
+"""Random generators of a training, from the run's seed, the epoch, and the kind of draw.
 
 Every draw has a random generator of its own. So it does not matter how often others have drawn
 before, in which process the draw is made, or whether the training was interrupted before it.
@@ -11,7 +11,7 @@ import numpy as np
 
 
 class Draw(IntEnum):
-    """What is drawn."""
+    """The kinds of draws."""
 
     ORDER = 0
     AUGMENTATION = 1
@@ -28,7 +28,7 @@ def generator_of(draw: Draw, seed: int, epoch: int, *number: int) -> np.random.G
     """The random generator of one draw.
 
     Args:
-        draw: What is drawn.
+        draw: Kind of draw.
         seed: Seed of the run.
         epoch: The epoch, from 0.
         number: The number of the scan in the data, and which time it is drawn where that is not the

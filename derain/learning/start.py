@@ -14,8 +14,8 @@ class Start:
     """The trained model.
 
     Attributes:
-        name: What a user calls it, and the beginning of its file's checksum.
-        spec: How it is used.
+        name: The user's name for it, and the beginning of its file's checksum.
+        spec: Its Spec.
     """
 
     name: str
@@ -28,7 +28,7 @@ class Start:
         names the scans that both were trained on, for what is learnt from the one is in the other.
 
         Args:
-            spec: What the model's Spec would be without a start.
+            spec: The model's Spec without a start.
         """
         records = [(self.spec.data, self.spec.training), (spec.data, spec.training)]
         together = record_of_parts(

@@ -1,4 +1,4 @@
-"""What a model and its data agree on, once, before the first batch.
+"""The task that a model and its data agree on, once, before the first batch.
 
 The data have a card and training scans. The model needs columns, labels, and a view fitted to some
 of the scans. The :class:`Task` holds both; from then on neither depends on the other.
@@ -24,12 +24,12 @@ EXAMPLE_SCANS = 20
 
 @dataclass(frozen=True)
 class Task:
-    """How a model and its data work together.
+    """The terms on which a model and its data work together.
 
     Attributes:
         card: Data card of the scans, with the statistics that training needs.
-        spec: How the network is used: its view, channels and normalisation.
-        reads_labels: Whether training learns from labels; where not, none is read for it.
+        spec: Use of the network: its view, channels and normalisation.
+        reads_labels: True if training learns from labels; where not, none is read for it.
     """
 
     card: DataCard
@@ -48,7 +48,7 @@ class Task:
 
 @runtime_checkable
 class TrainingData(Protocol):
-    """What an agreement needs of a data module."""
+    """The interface of a data module that the agreement needs."""
 
     card: DataCard
     task: Task | None
@@ -62,7 +62,7 @@ class TrainingData(Protocol):
         """Some of the training scans."""
 
     def training_record(self) -> Mapping[str, tuple[str, ...]]:
-        """Which scans it trains on, as a Spec holds it."""
+        """The record of its training scans, for the Spec."""
 
 
 @runtime_checkable
@@ -84,7 +84,7 @@ def agree_on_task(model: "DerainingModule", data: TrainingData, training: bool =
     Args:
         model: The model. One that has a Spec, of an earlier training or of a checkpoint, keeps it.
         data: Its data module.
-        training: Whether the model is to be trained: then what the data card lacks is measured,
+        training: True if the model is to be trained: then what the data card lacks is measured,
             and a model without a Spec gets one, its view fitted to training scans.
 
     Raises:

@@ -110,7 +110,7 @@ def answers_figure(
     Args:
         scan: A scan with the teacher's labels.
         card: Data card of these labels.
-        called_rain: What the student calls rain, bool (N,).
+        called_rain: The student's rain, bool (N,).
         title: Heading.
 
     Raises:

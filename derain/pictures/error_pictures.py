@@ -56,7 +56,7 @@ def errors_figure(
     axes.spines[:].set_visible(False)
     left = Patch(color=LEFT(0.8), label="rain that is left")
     lost = Patch(color=LOST_SHADES(0.8), label="solid that is lost")
-    explained = "share of the class judged wrongly, and how many points that is"
+    explained = "share of the class judged wrongly, and its number of points"
     legend_below(figure, [left, lost], title=explained, fontsize=9, title_fontsize=9)
     return figure
 
@@ -137,7 +137,7 @@ def _draw_over_threshold(axes: Axes, points: OperatingPoints, chosen: int, best:
         axes.plot(points.thresholds, values, color=colour, linewidth=1.8, label=name)
     axes.axvline(points.thresholds[chosen], color=IOU, linewidth=1.2, label="chosen")
     axes.axvline(points.thresholds[best], color=IOU, linewidth=1.2, linestyle=":", label="most IoU")
-    axes.set(xlim=(0, 1), ylim=(0, 1.02), xlabel="threshold: rain is what is more probable")
-    axes.set_title("what another threshold would give", fontsize=10)
+    axes.set(xlim=(0, 1), ylim=(0, 1.02), xlabel="threshold: more probable points are rain")
+    axes.set_title("scores at other thresholds", fontsize=10)
     axes.grid(color="#e5e7eb", linewidth=0.6)
     axes.legend(loc="lower center", fontsize=8.5, ncols=3)

@@ -10,7 +10,7 @@ RAIN = "#39c5ff"
 MISSED = "#ffd23f"
 LOST = "#ff5d5d"
 
-# Colours by what a point is and what became of it; outcomes are numbers in this order.
+# Colours by the class of a point and its outcome; outcomes are numbers in this order.
 OUTCOMES = {
     "solid, kept": SOLID,
     "rain, removed": RAIN,

@@ -29,7 +29,7 @@ LEAST_PROBABILITY = 0.01
 # Names of the palette's colours.
 COLOUR_NAMES = dict(zip(palette.OUTCOMES.values(), ("grey", "blue", "yellow", "red"), strict=True))
 
-PROBABILITY_TEXT = "Probability of rain: dark, blue, white, ever higher"
+PROBABILITY_TEXT = "Probability of rain: from dark (low) over blue to white (high)"
 
 
 def write_playback(
@@ -239,25 +239,22 @@ def caption(frame: Frame, scan: Scan, labels: Labels | None, held_out: bool) -> 
         frame: The frame.
         scan: Its scan.
         labels: The labels that its rain is known by; None where it has none.
-        held_out: Whether a model was trained, and not on this scan.
+        held_out: True if a model was trained, and not on this scan.
     """
     which = f"**{_escaped(frame.key)}**, {len(scan):,} points" + ", held out" * held_out
     coloured = palette.OUTCOMES if labels else palette.WITHOUT_LABELS
     meanings = "\n".join(
         f"- {COLOUR_NAMES[colour]}: {meaning}" for meaning, colour in coloured.items()
     )
-    return f"{which}\n\n{meanings}\n\n{_known_by(labels)} {PROBABILITY_TEXT}.\n"
+    return f"{which}\n\n{meanings}\n\n{_meaning_of_rain(labels)} {PROBABILITY_TEXT}.\n"
 
 
-def _known_by(labels: Labels | None) -> str:
+def _meaning_of_rain(labels: Labels | None) -> str:
     if labels is None:
-        return "No labels: which points are rain is not known."
+        return "No labels: the true rain is unknown."
     if not labels.card.unknown:
-        return f"Rain is what the {labels.name} calls rain."
-    return (
-        f"Rain is what the {labels.name} calls rain; in its own view, yellow is what it does not "
-        "know."
-    )
+        return f"Rain means rain by the {labels.name}."
+    return f"Rain means rain by the {labels.name}; in its own view, undecided points are yellow."
 
 
 def _escaped(text: str) -> str:

@@ -1,4 +1,4 @@
-"""How the viewer shows a recording: scans side by side by method, range images, curves."""
+"""The layout of a recording in the viewer: scans side by side by method, range images, curves."""
 
 from collections.abc import Mapping, Sequence
 
@@ -27,7 +27,7 @@ def layout(methods: Mapping[str, Method], labels: Labels | None, placed: bool) -
     Args:
         methods: The methods by their titles.
         labels: Labels of the scans, where they have some.
-        placed: Whether the sensor's poses are known.
+        placed: True if the sensor's poses are known.
     """
     return Blueprint(
         views.Vertical(

@@ -20,7 +20,7 @@ PIPE_BLOCK = 1 << 20
 
 
 class RecordingFile:
-    """What Rerun logs, on its way to a file.
+    """A file that receives Rerun's log.
 
     Attributes:
         stream: Rerun's stream.
@@ -37,7 +37,7 @@ class RecordingFile:
         Args:
             entity: Path of the entity.
             archetypes: One or more archetypes of Rerun's.
-            static: Whether they hold at all times.
+            static: True if they hold at all times.
         """
         first, *others = archetypes
         self.stream.log(entity, first, *others, static=static, strict=True)

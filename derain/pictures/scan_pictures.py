@@ -194,7 +194,7 @@ def explain_colours(figure: Figure, colours: Mapping[str, str] = OUTCOMES) -> No
 
     Args:
         figure: The figure.
-        colours: Colours by what they mean.
+        colours: Colours by their meaning.
     """
     legend_below(figure, [Patch(color=colour, label=name) for name, colour in colours.items()])
 
@@ -204,7 +204,7 @@ def legend_below(figure: Figure, handles: Sequence[Any], **options: Any) -> None
 
     Args:
         figure: The figure.
-        handles: What the legend explains, with labels.
+        handles: Entries of the legend, with labels.
         options: Of matplotlib's ``legend``.
     """
     columns = max(len(handles), 1)
@@ -242,9 +242,9 @@ def draw_from_above(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -
     """Draws a scan from above, in metres, forward being up; most points are within the limits.
 
     Args:
-        axes: Where to draw.
+        axes: The axes to draw in.
         scan: The scan; invalid points are not drawn.
-        outcome: What became of each point, as a number of ``OUTCOMES``, int64 (N,); None shows
+        outcome: Outcome of each point, as a number of ``OUTCOMES``, int64 (N,); None shows
             intensity.
     """
     seen = scan.valid
@@ -269,9 +269,9 @@ def scatter(
     """Draws points, the rarest colour last and largest, so that none covers it.
 
     Args:
-        axes: Where to draw.
-        x: Where the points lie along the axis to the right, (N,).
-        y: Where they lie along the axis upwards, (N,).
+        axes: The axes to draw in.
+        x: Positions of the points along the axis to the right, (N,).
+        y: Positions along the axis upwards, (N,).
         colours: RGBA, float64 (K, 4).
         number: Number of each point's colour, int64 (N,).
     """

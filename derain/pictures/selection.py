@@ -118,7 +118,7 @@ class Selection:
 
     @cached_property
     def look(self) -> "SensorLook":
-        """How the scans are drawn."""
+        """The scale and view in which the scans are drawn."""
         return SensorLook.of(self.frames)
 
     @cached_property
@@ -133,7 +133,7 @@ class Selection:
 
 @dataclass(frozen=True)
 class SensorLook:
-    """How scans of one sensor are drawn.
+    """The scale and view in which scans of one sensor are drawn.
 
     Attributes:
         brightest: Intensity that is drawn white, in the unit of the scans.
@@ -227,7 +227,7 @@ class Labels:
             scan: The scan read from it.
 
         Raises:
-            InputError: Labels that are damaged, or that the data card does not know.
+            InputError: Labels that are damaged, or that are not on the data card.
         """
         if not frame.has_labels:
             return None

@@ -48,7 +48,7 @@ class Standing:
 
     @property
     def place(self) -> tuple[float, float]:
-        """Where its marker is: milliseconds, and the error as it is drawn."""
+        """Position of its marker: milliseconds, and the error as it is drawn."""
         return self.milliseconds, max(self.error, LEAST_ERROR)
 
     @property

@@ -1,4 +1,4 @@
-"""What speaks for rain at each point: rays of other scans, its surroundings, and its neighbours.
+"""Evidence of rain at each point: rays of other scans, its surroundings, and its neighbours.
 
 Rays of other scans pass the place of a drop, and end at the place of anything solid. In its own
 scan a drop has nothing near it, and lies on no surface. The log-odds of both are added, as of two
@@ -95,7 +95,7 @@ class ScanPoints:
         to_other: NDArray[np.float64],
         at_drops: NDArray[np.bool_] | None = None,
     ) -> RayEvidence:
-        """What the rays of another scan show at the points of this one.
+        """The evidence of another scan's rays at the points of this one.
 
         Args:
             other: The other scan.

@@ -1,4 +1,4 @@
-"""Where a sensor was, scan by scan, from nothing but its scans.
+"""Poses of a sensor, scan by scan, from its scans alone.
 
 A registration is trusted where the scans fit, and where a vehicle could have driven so.
 """
@@ -36,7 +36,7 @@ WELL_ENOUGH = 0.08
 
 # Share of surfaces that must face every direction. A flat road has 0 of them along itself; the
 # scans above, and simulated streets (spinning_64 and mems_64, 0 to 200 mm/h), have .02 or more. Of
-# 10,000 surfaces a two-hundredth still is 50, of 5 cm noise each, which know the motion to 1 cm.
+# 10,000 surfaces a two-hundredth still is 50, of 5 cm noise each, which give the motion to 1 cm.
 LEAST_FACING = 0.005
 
 # What no vehicle does between two scans, where they are taken five times a second or more often:
@@ -52,7 +52,7 @@ NO_POINTS = Scan.of(np.zeros((0, 3), np.float32))
 
 @dataclass(frozen=True, eq=False)
 class Registration:
-    """Where a scan was taken, by the scan before it.
+    """The pose of a scan, relative to the scan before it.
 
     Attributes:
         motion: Takes this scan's frame to that of the scan before, float64 (4, 4), metres; the
@@ -63,7 +63,7 @@ class Registration:
         residual: Median distance of this scan's surfaces from those of the scan before, metres; NaN
             where no point found a partner.
         matched: Share of its points that found a partner in the scan before; 0..1.
-        trusted: Whether the motion is what it seems to be.
+        trusted: True if the motion is plausible.
         reason: Why not; empty where it is trusted.
     """
 
@@ -76,19 +76,19 @@ class Registration:
 
     @property
     def distance(self) -> float:
-        """How far the sensor moved, metres."""
+        """Distance that the sensor moved, metres."""
         return shift_of(self.motion)
 
     @property
     def turn(self) -> float:
-        """By how much it turned, degrees, whatever about."""
+        """Angle of the turn, degrees, about any axis."""
         return turn_of(self.motion)
 
     def issues(self) -> Iterator[ScanIssue]:
-        """Says so where it is not to be trusted."""
+        """Yields an issue if it is not to be trusted."""
         if not self.trusted:
-            detail = f"where it was taken is not known: {self.reason}"
-            yield ScanIssue("its place is not known", detail)
+            detail = f"its pose is not known: {self.reason}"
+            yield ScanIssue("its pose is not known", detail)
 
 
 def shift_of(motion: NDArray[np.float64]) -> float:
@@ -113,36 +113,34 @@ def turn_of(motion: NDArray[np.float64]) -> float:
 
 
 class Trust:
-    """What the scans of a sequence were like so far, and whether the next one is like them."""
+    """Statistics of a sequence so far, and the check that the next scan fits them."""
 
     def __init__(self) -> None:
         self._residuals: list[float] = []
         self._motions: list[NDArray[np.float64]] = []  # the last trusted one, and the last one
 
     def misfit(self, fit: Fit) -> str:
-        """Why two scans do not lie upon one another; empty where they do.
+        """Reason why two scans cannot be registered; empty if they can.
 
         Args:
-            fit: How they lie.
+            fit: The fit.
         """
         if fit.matched < LEAST_MATCHED:
             return (
-                f"only {fit.matched:.0%} of its surfaces are where the scan before has some: it is "
-                "of another place, or too far on"
+                f"only {fit.matched:.0%} of its surfaces match those of the scan before: it shows "
+                "another place, or is too far away"
             )
         if fit.residual > (most := self._most_apart()):
             return (
-                f"its surfaces lie {fit.residual:.3f} m from those of the scan before, where "
-                f"{most:.3f} m is the most"
+                f"its surfaces lie {fit.residual:.3f} m from those of the scan before, more than "
+                f"the limit of {most:.3f} m"
             )
         if fit.facing < LEAST_FACING:
-            return (
-                "too little stands across some direction to tell how far the sensor went along it"
-            )
-        return "" if fit.converged else "the search for the motion did not come to rest"
+            return "too few surfaces face some direction to measure the motion along it"
+        return "" if fit.converged else "the search for the motion did not converge"
 
     def unlikely(self, motion: NDArray[np.float64]) -> str:
-        """Why no vehicle moves so between two scans; empty where one may.
+        """Reason why no vehicle moves in this way between two scans; empty if one can.
 
         Args:
             motion: Takes a scan's frame to that of the scan before, float64 (4, 4), metres.
@@ -157,16 +155,16 @@ class Trust:
             return ""
         least = min(changes, key=shift_of)
         return (
-            f"{shift_of(motion):.1f} m from the scan before, {shift_of(least):.1f} m off what the "
-            "motion so far leads to: the scans are out of order or far apart"
+            f"{shift_of(motion):.1f} m from the scan before, {shift_of(least):.1f} m off the "
+            "prediction from the motion so far: the scans are out of order or far apart"
         )
 
     def remember(self, fit: Fit, trusted: bool) -> None:
-        """Takes a registration that fits into what is usual.
+        """Adds a registration that fits to the statistics.
 
         Args:
-            fit: How the two scans lie upon one another.
-            trusted: Whether a vehicle may have moved so.
+            fit: The fit of the two scans.
+            trusted: True if a vehicle can move in this way.
         """
         if trusted:
             self._residuals.append(fit.residual)
@@ -187,7 +185,7 @@ def _is_small(change: NDArray[np.float64]) -> bool:
 class Odometry:
     """Finds how a sensor moved, from one scan to the next, by GICP of the two.
 
-    Each search starts from the last motion, which goes on for a moment whatever the driver does.
+    Each search starts from the last motion, which persists for a moment in any manoeuvre.
     Where that fails, and for the first two scans, it starts over with partners farther apart.
 
     Example:
@@ -243,7 +241,7 @@ class Odometry:
         return self._moved(fit.motion, fit, reason)
 
     def _fit(self, surfaces: Surfaces, before: Surfaces) -> Fit:
-        """Lays a scan upon the one before: as the motion goes on, or else starting over."""
+        """Registers a scan to the one before, starting from the last motion or else from none."""
         if self._expected is not None:
             fit = surfaces.onto(before, self._expected, WITHIN)
             if not self._trust.misfit(fit):
@@ -252,7 +250,7 @@ class Odometry:
         return surfaces.onto(before, afar.motion, WITHIN)
 
     def _going_on(self, fit: Fit | None, reason: str) -> Registration:
-        """Where the sensor would be if it had gone on as it did."""
+        """The pose extrapolated at constant velocity."""
         return self._moved(np.eye(4) if self._expected is None else self._expected, fit, reason)
 
     def _moved(self, motion: NDArray[np.float64], fit: Fit | None, reason: str) -> Registration:
@@ -262,7 +260,7 @@ class Odometry:
 
 
 class FrameOdometry:
-    """Odometry of frame after frame, which starts anew with each recording.
+    """Odometry of frame after frame, which starts again with each recording.
 
     Args:
         threads: Threads to use; 0 takes every core this process may use.

@@ -30,7 +30,7 @@ MOST_SCANS = 50
 
 @dataclass(frozen=True)
 class Persistence:
-    """How far persistence looks, and when it is sure.
+    """Parameters of persistence: its window, and the odds at which it is sure.
 
     Attributes:
         before: Scans before the one that is judged.
@@ -75,14 +75,14 @@ class PersistenceDerainer(RecordingMethod):
         [True, False, False, False]
 
     Args:
-        persistence: How far it looks, and when it is sure.
+        persistence: Its window, and the odds at which it is sure.
         threads: Threads to use; 0 takes every core this process may use.
 
     Source: free and occupied space as evidence follows occupancy grids (A. Elfes, "Using Occupancy
         Grids for Mobile Robot Perception and Navigation", 1989), with rays instead of cells.
     """
 
-    HELP: ClassVar[str] = "rain is not where it was: rays of other scans went through its place"
+    HELP: ClassVar[str] = "rain does not stay in its place: rays of other scans pass through it"
     EXAMINE_EVERY: ClassVar[int] = 1  # any scan may be one whose place is not known
 
     def __init__(self, persistence: Persistence = Persistence(), threads: int = 0) -> None:
@@ -110,11 +110,11 @@ class PersistenceDerainer(RecordingMethod):
 
     @property
     def waiting(self) -> int:
-        """How many frames were pushed and are not answered for."""
+        """Number of frames that were pushed and not answered."""
         return self._recent.waiting
 
     def starts_new_recording(self, frame: Frame) -> bool:
-        """Whether a frame does not follow those that wait."""
+        """True if a frame does not follow those that wait."""
         return self.waiting > 0 and self._recent.starts_new_recording(frame)
 
     def push(
@@ -139,13 +139,13 @@ class PersistenceDerainer(RecordingMethod):
         self._end_recording()
 
     def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
-        """What is odd about a scan: its places, nothing known of it, or no pose to be trusted."""
+        """Warnings about a scan: its places, nothing known of it, or no pose to be trusted."""
         yield from viewpoint_issues(judgement.scan)
         yield from self._recent.doubts(judgement.scan)
         if judgement.known is not None and not judgement.known.any() and judgement.judged.any():
             yield ScanIssue(
                 "nothing is known for sure",
-                "no scan before or after it shows anything: nothing of it is called rain",
+                "no scan before or after it gives evidence: none of its points is called rain",
             )
 
     def as_dict(self) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from derain.views.scan_issues import ScanIssue
 from derain.views.window import PlacedScan, Window
 
 # Kind of the issue of a frame whose record of its pose is damaged.
-SOUGHT = "its pose is sought from the scans"
+SOUGHT = "its pose is computed from the scans"
 
 
 class PlacedFrames(RecentFrames):
@@ -40,7 +40,7 @@ class PlacedFrames(RecentFrames):
     def place(
         self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch
     ) -> FrameInWindow | None:
-        """Reads and places the next frame; where it starts anew, those still waiting are dropped.
+        """Reads and places the next frame; a new recording drops those still waiting.
 
         Args:
             frame: A frame; or a scan, or its points, which is taken for the next of one sequence.
@@ -62,11 +62,11 @@ class PlacedFrames(RecentFrames):
         return self.push(frame, placed)
 
     def doubts(self, scan: Scan) -> Iterator[ScanIssue]:
-        """What is in doubt about where a scan was taken."""
+        """Doubts about the pose of a scan."""
         yield from self._doubts.get(scan, ())
 
     def damage(self, scan: Scan) -> Iterator[ScanIssue]:
-        """What is damaged about the record of where a scan was taken."""
+        """The error of a damaged record of a scan's pose."""
         yield from (doubt for doubt in self.doubts(scan) if doubt.kind == SOUGHT)
 
     def _placed(self, frame: Frame, scan: Scan) -> PlacedScan:
@@ -74,12 +74,12 @@ class PlacedFrames(RecentFrames):
         try:
             pose = frame.pose
         except InputError as error:
-            detail = f"its pose is not known, and is sought from the scans: {error}"
+            detail = f"its pose is not known, and is computed from the scans: {error}"
             doubts.append(ScanIssue(SOUGHT, detail))
-        given = pose is not None
-        if self.starts_new_recording(frame) or self._has_poses not in (None, given):
+        has_pose = pose is not None
+        if self.starts_new_recording(frame) or self._has_poses not in (None, has_pose):
             self._stretch += 1  # another world
-        self._has_poses = given
+        self._has_poses = has_pose
         if pose is None:
             registration = self._odometry.register(frame, scan)
             doubts.extend(registration.issues())
@@ -90,7 +90,7 @@ class PlacedFrames(RecentFrames):
 
 
 def are_placed(recording: Sequence[Frame]) -> bool:
-    """Whether all frames of a recording have poses, so that none is found from its scans."""
+    """True if all frames of a recording have poses, so that none is found from its scans."""
     try:
         return all(frame.pose is not None for frame in recording)
     except InputError:  # a damaged record: see PlacedFrames

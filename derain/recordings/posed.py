@@ -1,4 +1,4 @@
-"""Frames with poses: of a file, of a sensor that stands, or found by odometry."""
+"""Frames with poses: from a file, of a sensor at rest, or computed by odometry."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -35,7 +35,7 @@ class Odometry:
     threads: int = 0
 
     def __call__(self, frames: Sequence[Frame]) -> list[tuple[Frame, list[ScanIssue]]]:
-        """Each frame with its pose, as :func:`with_poses` gives it, and what is odd about it."""
+        """Each frame with its pose, as :func:`with_poses` gives it, and warnings about it."""
         issues: list[list[ScanIssue]] = []
 
         def note(frame: Frame, registration: Registration) -> None:
@@ -135,7 +135,7 @@ def _with_file_poses(source: Sequence[Frame], path: Path) -> Frames:
 
 
 def _scan_of(frame: Frame) -> Scan | None:
-    """The scan of a frame; None where it cannot be read, an error of whatever needs it later."""
+    """The scan of a frame; None if it cannot be read, which is an error where it is needed."""
     try:
         return frame.read()
     except InputError:

@@ -1,4 +1,4 @@
-"""What the rays of another scan show at some places: whether they ended there, or went through.
+"""Evidence of another scan's rays at some places: whether they ended there, or passed through.
 
 Rays of other scans pass the place of a drop, and end at the place of anything solid. It does not
 matter how the sensor scans: its rays are where its returns are. Each of two returns of a ray is the
@@ -54,7 +54,7 @@ class Rays:
     """The rays of a scan, by their directions.
 
     Args:
-        xyz: Where they end, float (M, 3), metres, in the sensor's frame.
+        xyz: Ends of the rays, float (M, 3), metres, in the sensor's frame.
         threads: Threads of every search.
         rows: Rows of the scan that they are of, int64 (M,); by default 0 to M - 1.
     """
@@ -126,7 +126,7 @@ def range_of(xyz: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class RayEvidence:
-    """What the rays of another scan, or of several, show at M places.
+    """The evidence of the rays of another scan, or of several, at M places.
 
     Attributes:
         ending: Share of the rays near a place that end at it, float64 (M,), weighted by how near

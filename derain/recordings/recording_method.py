@@ -1,4 +1,4 @@
-"""What a method of recordings is, and all that there are."""
+"""The base class of methods of recordings, and their registry."""
 
 from abc import abstractmethod
 from collections.abc import Mapping
@@ -23,7 +23,7 @@ class RecordingMethod(Method):
     :meth:`derain.sources.recent_frames.FrameInWindow.naming_errors`, errors name that frame.
 
     Attributes:
-        HELP: What rain is to the method, in one line for the help of commands.
+        HELP: The method's definition of rain, in one line for the help of commands.
     """
 
     HELP: ClassVar[str] = ""

@@ -41,11 +41,11 @@ FEWEST_SURFACES = 200
 
 @dataclass(frozen=True)
 class Fit:
-    """How well one scan's surfaces lie on another's.
+    """The fit of one scan's surfaces to another's.
 
     Attributes:
         motion: Takes the first one's frame to that of the other, float64 (4, 4), metres.
-        converged: Whether the search for it came to rest.
+        converged: True if the search for it converged.
         residual: Median distance between partners across their surface, metres; NaN without any.
         matched: Share of surfaces with a partner within a voxel, 0..1.
         facing: Share of partners that hold the motion in the direction in which it is held least,
@@ -86,7 +86,7 @@ class Surfaces:
 
     @property
     def are_enough(self) -> bool:
-        """Whether anything can be laid upon them."""
+        """True if anything can be laid upon them."""
         return len(self) >= FEWEST_SURFACES
 
     def onto(self, other: "Surfaces", start: NDArray[np.float64], within: float) -> Fit:
@@ -95,7 +95,7 @@ class Surfaces:
         Args:
             other: Those of the other scan. Both must be enough.
             start: Motion to begin with, float64 (4, 4), metres.
-            within: How far apart partners may be, metres.
+            within: Largest distance between partners, metres.
 
         Source: A. Segal, D. Haehnel, S. Thrun, "Generalized-ICP", RSS 2009.
         """

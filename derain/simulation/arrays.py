@@ -30,13 +30,13 @@ class Columns:
 
 @dataclass(frozen=True, eq=False)
 class Returns(Columns):
-    """What comes back to the sensor, ordered by beam.
+    """Returns to the sensor, ordered by beam.
 
     Every beam has a row, also one that nothing returned; a sensor of dual returns may give it two,
     the strongest first.
 
     Attributes:
-        range: Where the beam ends, as a distance from the sensor, float64 (N,), metres; the maximum
+        range: End of the beam, as a distance from the sensor, float64 (N,), metres; the maximum
             range where nothing returned.
         reflectivity: Apparent reflectivity, float64 (N,), in 0..1: what a surface across the whole
             beam and facing the sensor would need to return as much through clear air. 0 where

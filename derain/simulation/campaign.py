@@ -45,12 +45,12 @@ LONGEST = 2000.0
 
 @dataclass(frozen=True)
 class Drive:
-    """A drive along a street, or a stand in it while others move.
+    """A drive along a street, or a sensor at rest in it while others move.
 
     Attributes:
         speed: Speed of the sensor along the street, m/s; 0 stands.
-        traffic: How many cars and pedestrians move, each at a speed of its own.
-        skew: Whether every beam sees the scene as it is when that beam is sent, so that a scan is
+        traffic: Number of cars and pedestrians that move, each at a speed of its own.
+        skew: True if every beam sees the scene as it is when that beam is sent, so that a scan is
             skewed by what moves while it is taken; else all of a scan is seen as it is when the
             scan begins, as after a perfect correction.
 
@@ -77,7 +77,7 @@ class Drive:
         """Length of the drive in metres.
 
         Args:
-            duration: How long it takes, seconds.
+            duration: Duration, seconds.
 
         Raises:
             InputError: Too long a drive.
@@ -93,9 +93,9 @@ class SplitSequences(ABC):
     """A data set of sequences that are drawn by their numbers and split into three parts.
 
     Attributes:
-        train: How many to train on, at least one.
-        validation: How many to choose a model with.
-        test: How many to judge it on.
+        train: Number to train on, at least one.
+        validation: Number to choose a model with.
+        test: Number to judge it on.
         seed: Seed of everything drawn.
         DIGITS: Of the name of a sequence.
     """
@@ -176,7 +176,7 @@ class Campaign(SplitSequences):
         layout: One of :data:`LAYOUTS`: ``facility``, a test track under sprinklers, or a random
             place in even rain.
         radar: The radar; None leaves it out, and with it the folders of its scans.
-        drive: What moves, in a street and without a radar; None stands where nothing does.
+        drive: Motion in a street, without a radar; None if nothing moves.
 
     Raises:
         InputError: Too few or too many sequences or scans, a negative seed, no rain rate or an
@@ -249,7 +249,7 @@ class Campaign(SplitSequences):
 
     @property
     def times(self) -> Floats:
-        """When the scans of a sequence are taken, float64 (scans,), seconds from 0 on."""
+        """Time at which the scans of a sequence are taken, float64 (scans,), seconds from 0 on."""
         return np.arange(self.scans) / self.lidar.frame_rate
 
     @property
@@ -273,7 +273,7 @@ class Campaign(SplitSequences):
 def partition(sequences: int) -> tuple[int, int, int]:
     """Divides a number of sequences into those to train on, to validate and to test on.
 
-    Of one or two sequences none is held out: whoever makes so few wants to look at them.
+    Of one or two sequences none is held out: so few are only made to look at them.
     """
     held_out = max(1, round(HELD_OUT * sequences)) if sequences >= 3 else 0
     return sequences - 2 * held_out, held_out, held_out

@@ -50,11 +50,11 @@ def simulate_track(
 
     Args:
         root: Folder to write: a new or an empty one, or one that holds part of this very data set.
-        campaign: What to simulate.
+        campaign: The campaign to simulate.
         executor: Simulates the sequences; None does it in this process.
         shard: The shard of the sequences that is simulated; None for all. Whoever does the last
             shard completes the manifest.
-        keep: Whether the data set is a person's. One that a program made for its own use, without
+        keep: True if the data set is a person's. One that a program made for its own use, without
             it, is replaced where the program simulates another campaign in the folder.
 
     Returns:
@@ -101,7 +101,7 @@ class SequenceWork(ValueWork[Unit]):
 
     Attributes:
         root: Folder of the data set.
-        campaign: What is simulated.
+        campaign: The campaign to simulate.
     """
 
     root: Path
@@ -125,7 +125,7 @@ class SequenceWork(ValueWork[Unit]):
         return checksums(folder, self.root)
 
     def look(self) -> IsThere[Unit, Value]:
-        """Whether a sequence is there."""
+        """True if a sequence is there."""
         return lambda unit, values: (self.root / SEQUENCES / unit.id).is_dir()
 
 
@@ -146,7 +146,7 @@ def _locked(root: Path, *, shared: bool) -> Iterator[None]:
 
     Args:
         root: The folder.
-        shared: Whether the shards of one run may simulate in it at the same time.
+        shared: True if the shards of one run may simulate in it at the same time.
     """
     if root.exists() and not root.is_dir():
         raise InputError(root, "is not a folder", "Name a new or empty folder.")

@@ -23,7 +23,7 @@ SMALLEST_GAP = 0.3
 
 @dataclass(frozen=True)
 class Defects(Settings):
-    """What is wrong with the scans of a sensor; the default is nothing.
+    """The defects of a sensor's scans; none by default.
 
     Attributes:
         SUBJECT = "defects"
@@ -59,9 +59,9 @@ class Defects(Settings):
         """Lets beams at the border of two surfaces return both, or what lies in between.
 
         Args:
-            returns: What the sensor detects.
+            returns: Detected returns.
             columns: Beams per row of the sensor.
-            dual: Whether it reports two returns of a beam.
+            dual: True if it reports two returns of a beam.
             generator: Random generator.
 
         Returns:
@@ -80,10 +80,10 @@ class Defects(Settings):
         return _with_both(merged, row[apart], returns.take(beside[apart]), share[apart])
 
     def received(self, returns: Returns, shape: tuple[int, int], generator: Generator) -> Bools:
-        """Which returns are not lost, bool (N,).
+        """True for returns that are not lost, bool (N,).
 
         Args:
-            returns: What the sensor detects.
+            returns: Detected returns.
             shape: Rows of the sensor and beams per row.
             generator: Random generator.
         """
@@ -116,7 +116,7 @@ class Defects(Settings):
 
 
 def _single(beam: Ints) -> Bools:
-    """Whether each row is the only one of its beam, bool (N,), beams ascending."""
+    """True if each row is the only one of its beam, bool (N,), beams ascending."""
     changes = np.diff(beam, prepend=-1, append=-1) != 0
     return np.asarray(changes[1:] & changes[:-1])
 

@@ -34,12 +34,12 @@ class Spans(Settings):
 
 @dataclass(frozen=True)
 class DefectSpans(Spans):
-    """What the defects of sensors are drawn from; shares are drawn evenly.
+    """The ranges that defects of sensors are drawn from; shares are drawn evenly.
 
     Attributes:
         SUBJECT = "defect spans"
     none: Share of the sensors without any.
-        each: How probable each defect is in the others.
+        each: Probability of each defect in the others.
         dropped: See :class:`derain.simulation.defects.Defects`, as for all that follow.
         dropped_rows: Likewise.
         dropped_sectors: Likewise.
@@ -63,7 +63,7 @@ class DefectSpans(Spans):
 
 @dataclass(frozen=True)
 class SensorSpans(Spans):
-    """What sensors are drawn from. The defaults span the sensors of today.
+    """The ranges that sensors are drawn from. The defaults span the sensors of today.
 
     Angles are in degrees, distances in metres. Spans of a decade or more are
     log-uniform where stated, the others uniform.
@@ -101,7 +101,7 @@ class SensorSpans(Spans):
         aperture: Metres.
         beam_divergence: Log-uniform, radians.
         frame_rate: Hz.
-        defects: What is wrong with them.
+        defects: Their defects.
 
     Raises:
         InputError: A value that is impossible.
@@ -179,7 +179,7 @@ def draw_sensor(spans: SensorSpans, generator: Generator) -> Sensor:
     """Draws a sensor with its defects.
 
     Args:
-        spans: What is drawn from.
+        spans: The ranges to draw from.
         generator: Random generator.
 
     Raises:
@@ -205,9 +205,9 @@ def draw_defects(spans: DefectSpans, generator: Generator, *, dual: bool) -> Def
     """Draws what is wrong with the scans of a sensor.
 
     Args:
-        spans: What is drawn from.
+        spans: The ranges to draw from.
         generator: Random generator.
-        dual: Whether the sensor reports two returns of a beam. Half of those that do report the
+        dual: True if the sensor reports two returns of a beam. Half of those that do report the
             two of every beam, be they the same.
     """
     some = generator.random() >= spans.none
@@ -300,9 +300,9 @@ def draw_row_table(
 
     Args:
         field: Lowest and highest row, degrees.
-        rows: How many, two or more.
+        rows: Number of rows, two or more.
         generator: Random generator.
-        even: Whether all steps are alike, but for some misalignment.
+        even: True if all steps are alike, but for some misalignment.
 
     Returns:
         Inclinations from top to bottom, degrees, all within the field.
@@ -331,7 +331,7 @@ def draw_row_azimuths(rows: int, most: float, generator: Generator) -> tuple[flo
     HDL-64), or each a little aside, by its calibration.
 
     Args:
-        rows: How many rows.
+        rows: Number of rows.
         most: Most that a row is turned either way.
         generator: Random generator.
 

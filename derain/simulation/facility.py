@@ -50,7 +50,7 @@ def on_slope(surfaces: Iterable[Surface], aside: float, heading: float, slope: F
 
     Args:
         surfaces: All that is on the track, at least one surface.
-        aside: How far the surfaces are moved to the left, metres.
+        aside: Shift of the surfaces to the left, metres.
         heading: Angle by which they are turned first, radians from x towards y.
         slope: Rise of the ground per metre ahead and per metre to the left, (2,).
     """

@@ -72,11 +72,11 @@ def manifest_of(root: Path) -> dict[str, Any]:
 
 
 def parameters_of(manifest: Mapping[str, Any], within: str = "") -> dict[str, Any]:
-    """What the data set was made from, each value by its path, such as ``campaign.sensor.rows``.
+    """The parameters of the data set, each value by its path, such as ``campaign.sensor.rows``.
 
     Args:
         manifest: Content of a manifest.
-        within: Path of what it is part of, with a dot at its end.
+        within: Path of its parent, with a dot at its end.
     """
     found: dict[str, Any] = {}
     for name, value in manifest.items():

@@ -225,7 +225,7 @@ def specks(surface: Triangles, sensor: Floats, count: int, generator: Generator)
         surface: Triangles that they lie on, (T, 3, 3), metres.
         sensor: Place of the sensor, (3,), metres. The farther a speck is, the larger it is, so that
             a beam, which widens as well, is returned by it.
-        count: How many.
+        count: Their number.
         generator: Random generator.
 
     Returns:
@@ -252,7 +252,7 @@ def mirrored(
     Args:
         surface: The surface as it would be if it returned all over.
         sensor: Place of the sensor, (3,), metres.
-        count: How many specks.
+        count: Number of specks.
         generator: Random generator.
     """
     yield replace(surface, reflectivity=MIRROR)

@@ -62,12 +62,12 @@ class Radar:
         columns: Cells across the field of view.
         rows: Cells from its lower to its upper edge.
         range_cell: Depth of a cell, metres.
-        minimum_range: Where the first cell begins, metres.
-        maximum_range: What is farther is not seen, metres.
-        reach: Where the receiver's noise is as strong as the echo of 1 m², metres; it grows with
+        minimum_range: Begin of the first cell, metres.
+        maximum_range: Farther surfaces are not seen, metres.
+        reach: Range at which the receiver's noise equals the echo of 1 m², metres; it grows with
             the fourth power of distance, as echoes get weaker.
-        leakage: What the transmitter leaks into every cell, as a radar cross-section, dBsm.
-        false_alarm_rate: How probably a cell of nothing but noise is a detection.
+        leakage: Leakage of the transmitter into every cell, as a radar cross-section, dBsm.
+        false_alarm_rate: Probability that a cell of noise alone is a detection.
         accuracy: Standard deviation of a measured position, as a share of the cell.
         doppler_noise: Standard deviation of a measured speed, m/s.
         mounting_height: Height above the road, metres.
@@ -152,7 +152,7 @@ def detect(mean: Floats, radar: Radar, generator: Generator) -> Scan:
     """Makes one frame.
 
     Args:
-        mean: What :func:`mean_echoes` gave.
+        mean: A result of :func:`mean_echoes`.
         radar: The radar.
         generator: Random generator.
 
@@ -220,7 +220,7 @@ def rain_echoes(rain: RainField, farthest: Floats, radar: Radar) -> Floats:
 
     Args:
         rain: The rain.
-        farthest: Where it ends in each direction, float64 (rows, columns), metres.
+        farthest: Largest range in each direction, float64 (rows, columns), metres.
         radar: The radar.
 
     Returns:
@@ -247,7 +247,7 @@ def volume_reflectivity(rate: Floats) -> Floats:
 
 
 def _threshold(echo: Floats, false_alarm_rate: float) -> Floats:
-    """What the echo of a cell must exceed: a multiple of the mean of its reference cells.
+    """The threshold of a cell's echo: a multiple of the mean of its reference cells.
 
     Source: Finn and Johnson 1968, "Adaptive detection mode with threshold control as a function of
     spatially sampled clutter-level estimates" (cell-averaging CFAR).

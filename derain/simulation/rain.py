@@ -48,7 +48,7 @@ def draw_drops(rate: float, reach: Floats, sensor: Sensor, generator: Generator)
 
     Args:
         rate: Rain rate, mm/h.
-        reach: Where each beam ends, float64 (N,), metres.
+        reach: Range at which each beam ends, float64 (N,), metres.
         sensor: The sensor whose beams they are.
         generator: Random generator.
     """
@@ -119,7 +119,7 @@ class Transmission:
 
     Args:
         rain: The rain.
-        maximum_range: How far the field is sampled, metres.
+        maximum_range: Largest range of the sampled field, metres.
     """
 
     def __init__(self, rain: RainField, maximum_range: float) -> None:
@@ -162,7 +162,7 @@ def rain_on_beams(
     returned ends at the maximum range, and can still meet a drop.
 
     Args:
-        clear: What each beam would return through clear air to a perfect detector: one row for
+        clear: Return of each beam through clear air to a perfect detector: one row for
             each of the N beams, in their order.
         beams: Unit vectors along them, float64 (N, 3), sensor frame.
         rain: The rain.

@@ -155,7 +155,7 @@ class SprinkledRain:
         return EXCESS_ON_AXIS * self.nominal / on_axis * density
 
     def _plumes(self) -> Floats:
-        """Where the sprinklers' water comes down, float64 (P, 2), metres."""
+        """Places where the sprinklers' water comes down, float64 (P, 2), metres."""
         stand = np.arange(FIRST_SPRINKLER, EVEN_SHARE * self.span + BEYOND_EVEN_PART, SPACING)
         phase = 2 * np.pi * (stand - PEAKS[0]) / (PEAKS[1] - PEAKS[0])
         along = stand - GUST_ALONG * np.sin(phase)
@@ -186,7 +186,7 @@ EXTINCTION_EFFICIENCY = 2.0
 
 
 def slope(rate: ArrayLike) -> Floats:
-    """How fast large drops get rare, Λ in mm⁻¹; infinite without rain.
+    """Slope of the drop size distribution, Λ in mm⁻¹; infinite without rain.
 
     Source: Marshall and Palmer 1948, Λ = 4.1 R^−0.21.
     """

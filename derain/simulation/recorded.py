@@ -84,7 +84,7 @@ def rain_on_scan(scan: Scan, rain: RainField, sensor: Sensor, generator: Generat
 def _clear_air(
     scan: Scan, row: Ints, returned: Bools, sensor: Sensor, generator: Generator
 ) -> Returns:
-    """What beams returned through clear air, strong enough to have been seen."""
+    """Returns of beams through clear air that are strong enough to be detected."""
     range_ = np.where(returned, scan.range[row].astype(np.float64), sensor.maximum_range)
     if scan.intensity is None:
         reflectivity = np.full(len(row), USUAL_REFLECTIVITY)
@@ -197,7 +197,7 @@ def with_intensity(scan: Scan, rows: Ints, intensity: Floats) -> Scan:
 
 
 def _unit(column: NDArray[Any], scan: Scan) -> float:
-    """What a column of ranges holds for a metre."""
+    """The number in a column of ranges that stands for one metre."""
     valid = scan.valid
     return float(np.median(column[valid] / scan.range[valid])) if valid.any() else 1.0
 

@@ -131,7 +131,7 @@ def _unreturned(scan: Scan, valid: Bools, generator: Generator) -> tuple[Ints, F
 
 
 def _looked_at(fit: GridFit, xyz: NDArray[np.float32], pixel: Ints) -> Bools:
-    """Whether pixels lie in the convex hull of the returns, bool (P,)."""
+    """True if pixels lie in the convex hull of the returns, bool (P,)."""
     azimuth, inclination = directions(xyz)
     across, up = _pixel_angles(fit, pixel)
     right = fit.grid.azimuth[0]  # from where azimuths rise without a jump
@@ -150,7 +150,7 @@ def _pixel_angles(fit: GridFit, pixel: Ints) -> tuple[Floats, Floats]:
 
 
 def in_hull(points: tuple[Floats, Floats], places: tuple[Floats, Floats]) -> Bools:
-    """Whether places lie in the convex hull of points, or on its edge.
+    """True if places lie in the convex hull of points, or on its edge.
 
     The hull of the returns never reaches beyond a field of view that is convex, be it a rectangle
     or a circle. It falls short of it where nothing returned near the edge, for example from the

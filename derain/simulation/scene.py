@@ -28,7 +28,7 @@ from derain.simulation.street import Street, lay_out_street
 from derain.simulation.track import Track
 from derain.simulation.traffic import Course, MovingThing, draw_traffic
 
-# Optical depth at which a black object cannot be told from the horizon: −ln 0.02.
+# Optical depth at which a black object cannot be distinguished from the horizon: −ln 0.02.
 # Source: Koschmieder 1924, with his contrast threshold of 2 %.
 VISIBLE_OPTICAL_DEPTH = 3.912
 
@@ -43,7 +43,7 @@ STRONGEST_WIND = 2.0
 
 
 def weather_record(nominal: float, at_sensor: float, wind: Place) -> dict[str, float]:
-    """What a weather station and a disdrometer would measure of some rain.
+    """The record of a weather station and a disdrometer in some rain.
 
     The drop spectrum N(D) = intercept · exp(−slope · D), the median diameter by volume and the
     visibility are those of the nominal rate. Clear air has an infinite slope, drops of no diameter,
@@ -77,12 +77,12 @@ class SimulatedScene:
     """A place, the rain on it and the weather; and what moves in it.
 
     Attributes:
-        track: What stands.
+        track: The track at rest.
         rain: The rain; it is the same wherever the sensor is.
         weather: The record of it, see :func:`weather_record`.
-        course: How the sensor moves; None stands at the origin of the track.
-        traffic: What else moves.
-        skew: Whether they move on while a scan is taken, see :class:`Drive`.
+        course: Motion of the sensor; None for a sensor at rest at the origin of the track.
+        traffic: Other moving objects.
+        skew: True if they move on while a scan is taken, see :class:`Drive`.
     """
 
     track: Track
@@ -114,11 +114,11 @@ class SimulatedScene:
         return cls(track, rain, weather, course, traffic, drive.skew)
 
     def cast(self, sensor: Sensor, times: Floats) -> Iterator[Returns]:
-        """What every beam of a sensor would return through clear air, scan after scan.
+        """The return of every beam of a sensor through clear air, scan after scan.
 
         Args:
             sensor: The sensor.
-            times: When the scans begin, float64 (T,), seconds.
+            times: Start times of the scans, float64 (T,), seconds.
 
         Yields:
             As :meth:`Track.cast`; labels have the number of what moves in their upper 16 bits.
@@ -141,7 +141,7 @@ class SimulatedScene:
             yield seen
 
     def _moments(self, course: Course, time: float, sensor: Sensor) -> tuple[Floats, Floats]:
-        """When the beams of a scan are sent, and the sensor's pose then: of all at once, or each.
+        """Times of the beams of a scan, and the sensor's pose then: of all at once, or each.
 
         Returns:
             Seconds, float64 () or (N,); and poses, float64 (4, 4) or (N, 4, 4).

@@ -66,12 +66,12 @@ class Sensor(Settings):
             into the field of view. Then a row is what one laser sees, in the order of time;
             ``row_inclinations`` is by how much it points above the others, and without them all
             lasers fire along one curve in turn.
-        prism_turns: How often each prism of a rosette turns during a scan, negative the other way;
+        prism_turns: Turns of each prism of a rosette during a scan, negative the other way;
             every scan begins with the same position of both. Those of the Livox Mid-40, which turn
             7,294 and −4,664 times a minute, at ten scans a second.
         tilt: Roll and pitch of the sensor where it is mounted, degrees; positive pitch looks down.
-        minimum_range: What is nearer is not seen, metres.
-        maximum_range: What is farther is not seen, metres.
+        minimum_range: Nearer surfaces are not seen, metres.
+        maximum_range: Farther surfaces are not seen, metres.
         aperture: Width of a beam where it leaves the sensor, metres.
         beam_divergence: Full opening angle of a beam, radians.
         detection_threshold: Weakest power that counts as a return, m⁻² (see Returns.power). The
@@ -86,7 +86,7 @@ class Sensor(Settings):
         returns: What is reported of a beam that several things return: ``strongest``, ``last``
             (the farthest of those detected), or ``dual`` (both, where they differ).
         frame_rate: Scans per second, Hz.
-        defects: What else is wrong with its scans.
+        defects: Defects of its scans.
 
     Raises:
         InputError: A value that no sensor can have.
@@ -186,7 +186,7 @@ class Sensor(Settings):
         return azimuth, (highest + lowest) / 2 + offsets + swing
 
     def beam_times(self) -> Floats:
-        """When each beam is sent, float64 (rows · columns,), seconds after the scan begins.
+        """Time of each beam, float64 (rows · columns,), seconds after the scan begins.
 
         Columns follow each other from the left to the right, as of a sensor that spins clockwise.
         """
@@ -203,10 +203,10 @@ class Sensor(Settings):
         return self.aperture + self.beam_spread * range
 
     def detected(self, clear: Returns, transmission: Floats) -> Returns:
-        """What the sensor would see of the surfaces if there were no particles in front of them.
+        """The detected returns of surfaces without any particles in front of them.
 
         Args:
-            clear: What each beam would return through clear air to a perfect detector.
+            clear: Return of each beam through clear air to a perfect detector.
             transmission: Share of the light that survives the way there and back, float64 (N,).
         """
         reflectivity = clear.reflectivity * transmission
@@ -220,7 +220,7 @@ class Sensor(Settings):
         )
 
     def reported(self, candidates: Returns) -> Returns:
-        """What the sensor reports of all that it could detect.
+        """The returns that the sensor reports, out of all that it could detect.
 
         Args:
             candidates: At least one row for every beam; of a beam that nothing returned one without

@@ -52,7 +52,7 @@ def write_sequence(folder: Path, campaign: Campaign, name: str) -> None:
 
     Args:
         folder: Folder to write.
-        campaign: What the sequence belongs to.
+        campaign: The campaign of the sequence.
         name: Name of the sequence.
 
     Raises:

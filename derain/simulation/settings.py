@@ -18,17 +18,17 @@ MOST = 2**31
 
 
 def is_share(value: float) -> bool:
-    """Whether a number is within 0 and 1."""
+    """True if a number is within 0 and 1."""
     return 0 <= value <= 1
 
 
 def is_positive(value: float) -> bool:
-    """Whether a number is finite and above 0."""
+    """True if a number is finite and above 0."""
     return 0 < value < math.inf
 
 
 def is_positive_span(span: Span) -> bool:
-    """Whether a span lies above 0, so that a number can be drawn evenly in its logarithm."""
+    """True if a span lies above 0, so that a number can be drawn evenly in its logarithm."""
     low, high = span
     return 0 < low <= high < math.inf
 
@@ -46,11 +46,11 @@ def weights_of(*names: str) -> Parser:
 
 @dataclass(frozen=True)
 class Settings:
-    """The base of frozen settings, of which a document states those that differ.
+    """The base of frozen settings; a document states those that differ from the defaults.
 
     Attributes:
-        SUBJECT: What messages call the settings.
-        READ_BY: What reads the attributes that are not read by their types, by name.
+        SUBJECT: Name of the settings in messages.
+        READ_BY: Parsers of attributes that are not parsed by type, by name.
 
     Raises:
         InputError: A value that is impossible. It names the first such attribute.
@@ -68,7 +68,7 @@ class Settings:
                 raise InputError(f"{self.SUBJECT}: {one.name}", reason, "Correct it.")
 
     def _possible(self) -> Mapping[str, bool]:
-        """Whether attributes are possible, by name, of which the type alone does not decide it."""
+        """Validity of attributes, by name, for conditions beyond their types."""
         return {}
 
     @classmethod
@@ -93,7 +93,7 @@ class Settings:
 
 
 def _is_possible(value: Any, kind: Any) -> bool:
-    """Whether a value is possible by its type.
+    """True if a value is possible by its type.
 
     Of a type without a rule, numbers are finite from 0 on, spans finite and ascending, and weights
     finite from 0 on with some of them above.
@@ -115,7 +115,7 @@ def _is_possible(value: Any, kind: Any) -> bool:
 
 
 def _parser(kind: Any) -> Parser:
-    """What reads a value of a type."""
+    """The function that parses a value of a type."""
     if get_origin(kind) is Literal:
         return Entry.text
     if get_origin(kind) is Annotated:

@@ -97,7 +97,7 @@ def inside_ellipsoid(count: int, radii: tuple[float, float, float], generator: G
     """Points uniform in an ellipsoid about the origin, (count, 3), metres.
 
     Args:
-        count: How many.
+        count: Their number.
         radii: Half-axes along x, y and z, metres.
         generator: Random generator.
     """
@@ -132,8 +132,8 @@ def rods(
     """Thin straight rods without caps.
 
     Args:
-        starts: Where each begins, (R, 3), metres.
-        ends: Where each ends, somewhere else, (R, 3), metres.
+        starts: Begin of each, (R, 3), metres.
+        ends: End of each, elsewhere, (R, 3), metres.
         radius: From axis to edge at its start, of each, (R,), or of all, metres.
         taper: Radius at the end over that at the start.
         sides: Sides of each.
@@ -159,8 +159,8 @@ def blades(starts: Floats, ends: Floats, width: Floats | float, generator: Gener
     """One flat triangle from each start, where it is wide, to a point: a blade of grass, a twig.
 
     Args:
-        starts: Where each begins, (B, 3), metres.
-        ends: Where each ends, somewhere else, (B, 3), metres.
+        starts: Begin of each, (B, 3), metres.
+        ends: End of each, elsewhere, (B, 3), metres.
         width: At the start, of each, (B,), or of all, metres.
         generator: Turns each about its length.
     """

@@ -41,7 +41,7 @@ class Street:
     """The ground plan of a street.
 
     Attributes:
-        length: How far the sensor drives, metres.
+        length: Distance that the sensor drives, metres.
         lane: Width of each of the two lanes, metres.
         junctions: Where the axes of side streets are, metres along x, ascending. They are as wide
             as the street's two lanes and carry traffic across it.
@@ -64,12 +64,12 @@ class Street:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Where the street begins and ends, metres along x."""
+        """Begin and end of the street, metres along x."""
         return -SIGHT, self.length + SIGHT
 
     @property
     def axis(self) -> float:
-        """Where its middle is, metres to the left of the sensor's lane."""
+        """Position of its middle, metres to the left of the sensor's lane."""
         return self.lane / 2
 
     def beside(self, side: int, outwards: float) -> float:
@@ -77,14 +77,14 @@ class Street:
         return self.axis + side * (self.lane + outwards)
 
     def in_junction(self, triangles: Triangles) -> bool:
-        """Whether a thing reaches into a side street or the pavement along it."""
+        """True if a thing reaches into a side street or the pavement along it."""
         x = triangles[..., 0]
         half = self.lane + PAVEMENT - PARKING
         return any(x.min() < middle + half and x.max() > middle - half for middle in self.junctions)
 
 
 def lay_out_street(street: Street, generator: Generator) -> Iterator[Surface]:
-    """What stands in a street.
+    """Lays out the objects of a street.
 
     On both sides, all along and on both sides of its pavements: parked cars, bicycles, trees with
     low boughs, lamps, people who stand, bushes, posts and houses with gaps between them. The road

@@ -48,7 +48,7 @@ class Track:
 
     @classmethod
     def joined(cls, tracks: Iterable["Track"]) -> "Track":
-        """Tracks as one, of which every surface is smooth."""
+        """Joins tracks into one, whose surfaces are all smooth."""
         parts = [(track.triangles, track.reflectivity, track.label) for track in tracks]
         return cls(*map(np.concatenate, zip(*parts, strict=True)))
 
@@ -58,7 +58,7 @@ class Track:
         return Track.joined([self, Track.of(added)]) if added else self
 
     def cast(self, sensor: Sensor, pose: Floats | None = None) -> Returns:
-        """What every beam of a sensor would return through clear air to a perfect detector.
+        """The return of every beam of a sensor through clear air to a perfect detector.
 
         A beam is one ray. Smooth surfaces scatter like Lambert's: their apparent reflectivity falls
         with the cosine of the angle of incidence. That of rough ones falls less, see

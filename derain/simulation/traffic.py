@@ -1,4 +1,4 @@
-"""What moves while a sequence is recorded: the sensor's vehicle, cars, and people who walk."""
+"""Moving objects of a sequence: the sensor's vehicle, cars, and people who walk."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -103,7 +103,7 @@ class MovingThing:
     """Something that moves at a steady speed.
 
     Attributes:
-        surface: Where it is at the first scan.
+        surface: Its place at the first scan.
         velocity: Along x and y, float64 (2,), m/s.
     """
 
@@ -127,10 +127,10 @@ def draw_traffic(
     moment of the drive, and none comes too near another or the sensor's vehicle at any scan.
 
     Args:
-        count: How many.
-        street: Where.
+        count: Their number.
+        street: The street.
         speed: Of the sensor, m/s.
-        times: When the scans are taken, float64 (T,), seconds from 0 on.
+        times: Times of the scans, float64 (T,), seconds from 0 on.
         generator: Random generator.
 
     Raises:
@@ -156,7 +156,7 @@ def draw_traffic(
 
 
 def _meet(first: Floats, second: Floats) -> bool:
-    """Whether bounds, float64 (T, 2, 2) each, come nearer than the clearance at one time."""
+    """True if bounds, float64 (T, 2, 2) each, come nearer than the clearance at one time."""
     apart = (first[:, 0] > second[:, 1] + KEPT_APART) | (second[:, 0] > first[:, 1] + KEPT_APART)
     return bool((~apart.any(axis=1)).any())
 

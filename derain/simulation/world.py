@@ -52,11 +52,11 @@ class World(Settings):
         places: Weight of each layout, by its name in ``LAYOUTS``; the default is all of them alike.
         horizon: Share of the places outdoors that go on to where only few beams reach.
         carrier: Share of the sensors that see what carries them.
-        sensors: What sensors are drawn from.
-        precipitation: What precipitation is drawn from.
+        sensors: Ranges of sensors.
+        precipitation: Ranges of precipitation.
 
     Raises:
-        InputError: Weights of which none is above 0, or a share outside 0 to 1.
+        InputError: No weight above 0, or a share outside 0 to 1.
     """
 
     SUBJECT = "world"
@@ -89,7 +89,7 @@ def draw_scan(world: World, generator: Generator) -> tuple[Scan, dict[str, Any]]
     """Draws a place, a sensor and the weather, and takes a scan.
 
     Args:
-        world: What is drawn from.
+        world: The ranges to draw from.
         generator: Random generator.
 
     Returns:
@@ -132,7 +132,7 @@ class WorldCampaign(SplitSequences):
         validation: Scans to choose a model with.
         test: Scans to judge it on.
         seed: Seed of everything drawn.
-        world: What they are drawn from, or the name of a packaged file of it, or of one's own.
+        world: The ranges to draw from, or the name of a packaged file of it, or of one's own.
 
     Raises:
         InputError: Too few or too many scans, or a negative seed.

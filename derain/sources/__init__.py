@@ -1,1 +1,1 @@
-"""Where scans come from."""
+"""Sources of scans, and sinks for results."""

@@ -27,7 +27,7 @@ class BagFrame(FileFrame):
 
     Attributes:
         clouds: The clouds of its topic.
-        cloud_number: Which of them it is, from 0, also where its place in its sequence is another.
+        cloud_number: Its number, from 0, also where its place in its sequence is another.
     """
 
     clouds: CloudTopic
@@ -51,7 +51,7 @@ class BagFrame(FileFrame):
 
     @property
     def time(self) -> float:
-        """When it was taken, seconds: the stamp of its header, or if that is 0, of the bag."""
+        """Time of the cloud, seconds: the stamp of its header, or if that is 0, of the bag."""
         return self.clouds.seconds(self.cloud_number)
 
     def read(self) -> Scan:
@@ -98,7 +98,7 @@ def bag_frames(path: Path, labelled: bool = False, prefix: str = "") -> list[Bag
     Args:
         path: A bag; a topic in it, ``bag/topic``; or one of its clouds, ``bag/topic/000012`` or
             ``bag/000012``.
-        labelled: Whether frames have their labels: ``<stem of the bag>.labels/000012.label``.
+        labelled: True if frames have their labels: ``<stem of the bag>.labels/000012.label``.
         prefix: First part of all keys; empty where the bag is the only one.
 
     Raises:
@@ -123,7 +123,7 @@ def bag_frame(clouds: CloudTopic, number: int, key: str) -> BagFrame:
 
     Args:
         clouds: The clouds.
-        number: Which of them, from 0.
+        number: Number of the cloud, from 0.
         key: Names the outputs of the frame.
     """
     frame = BagFrame(

@@ -1,4 +1,4 @@
-"""Scans without their rain: files in a folder, and whole bags written anew."""
+"""Scans without their rain: files in a folder, and rewritten bags."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -40,8 +40,8 @@ class CleanSink:
         folder: Folder to write to, made if missing; or a URL, to which a run in units writes.
         source: The scans.
         removed: Folder for the removed points of files; None leaves them out.
-        probability: Whether the written scans have the column ``rain_probability``.
-        bags: What is written of the clouds of bags.
+        probability: True if the written scans have the column ``rain_probability``.
+        bags: Options for the clouds of bags.
 
     Raises:
         InputError: The folder holds files that must not be overwritten, two scans have one name, or
@@ -50,7 +50,7 @@ class CleanSink:
     Attributes:
         folder: Folder to write to, or the path that stands for its URL.
         destination: By which any process opens a sink alike for other scans.
-        options: What is written, true or false or a name each.
+        options: Options, true, false or a name each.
     """
 
     def __init__(
@@ -154,13 +154,13 @@ class CleanSink:
 
 @dataclass(frozen=True)
 class Destination:
-    """Where scans are written without their rain, and what is written of them.
+    """The folder and form in which scans are written without their rain.
 
     Attributes:
         folder: The folder, a path or a URL.
         removed: Folder for the removed points of files, a path or a URL; None leaves them out.
-        probability: Whether the written scans have the column ``rain_probability``.
-        bags: What is written of the clouds of bags.
+        probability: True if the written scans have the column ``rain_probability``.
+        bags: Options for the clouds of bags.
     """
 
     folder: Place
@@ -170,12 +170,12 @@ class Destination:
 
     @property
     def is_stored(self) -> bool:
-        """Whether it is in an object store, even in part."""
+        """True if it is in an object store, even in part."""
         return is_url(self.folder) or (self.removed is not None and is_url(self.removed))
 
     @contextmanager
     def opened(self, source: Source) -> Iterator[tuple[CleanSink, dict[str, str]]]:
-        """Lends a sink; what it writes is at its place when the block has ended well.
+        """Lends a sink; its files are in their place after the block ends without an error.
 
         Args:
             source: The scans.
@@ -207,7 +207,7 @@ class Destination:
         return found
 
     def holds(self, source: Source) -> bool:
-        """Whether all files are there that are written of scans, but for those in stores.
+        """True if all files are there that are written of scans, but for those in stores.
 
         Args:
             source: The scans.
@@ -238,7 +238,7 @@ def require_probabilities(method: Method, source: Source) -> None:
     if not method.gives_probabilities:
         raise InputError(
             "--probability",
-            f"{method.as_dict()['method']} says which points are rain, and not how probably",
+            f"{method.as_dict()['method']} returns which points are rain, without probabilities",
             "Leave it out, or take a model or persistence.",
         )
     for frame in {frame.suffix: frame for frame in reversed(source)}.values():
@@ -258,7 +258,7 @@ def _path_of(place: Place) -> Path:
     if is_web(place):
         raise InputError(
             without_secrets(str(place)),
-            "a web server takes no results",
+            "a web server cannot store results",
             "Name a folder, or a URL such as s3://bucket/cleaned.",
         )
     return path_of(str(place)) if is_url(place) else Path(place)

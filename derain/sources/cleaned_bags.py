@@ -31,13 +31,13 @@ RAIN_PROBABILITY = "rain_probability"
 
 @dataclass(frozen=True)
 class BagOptions:
-    """What is written of the clouds of a bag.
+    """Options for the written clouds of a bag.
 
     Attributes:
         cleaned_topic: Name of a further topic, of clean clouds; None replaces the clouds of the
             topic that is read.
         removed_topic: Name of a further topic, of the points that were removed; None for none.
-        keep_shape: Whether organised clouds stay organised.
+        keep_shape: True if organised clouds stay organised.
     """
 
     cleaned_topic: str | None = None
@@ -53,8 +53,8 @@ class CleanedBags:
     Args:
         out: The folder to write to.
         source: All frames of the run. Bags of which it has only some clouds are not copied.
-        options: What is written of each cloud.
-        probability: Whether points get a field of their probability to be rain.
+        options: Options for each cloud.
+        probability: True if points get a field of their probability to be rain.
 
     Raises:
         InputError: A copy would replace or enter a bag that is read, or something that is no bag;
@@ -86,7 +86,7 @@ class CleanedBags:
         self.written: list[Path] = []
 
     def takes(self, frame: Frame) -> bool:
-        """Whether a frame is of a bag that is copied."""
+        """True if a frame is of a bag that is copied."""
         return isinstance(frame, BagFrame) and frame.clouds in self._targets
 
     def targets(self) -> list[Path]:
@@ -185,7 +185,7 @@ class CleanedBags:
         if there.is_relative_to(within):
             raise InputError(self.out, f"is inside {bag}", remedy)
         if os.path.lexists(target) and not is_bag(target):
-            raise InputError(target, "is there already, and no bag", remedy)
+            raise InputError(target, "exists, and is not a bag", remedy)
         pattern = ROS1_NAME if clouds.bag.is_ros1 else ROS2_NAME
         names = {topic.name for topic in clouds.bag.topics}
         for option, name in (

@@ -1,4 +1,4 @@
-"""What was done to scans, one by one, as records have it, and added up."""
+"""Results of cleaning, scan by scan as in records, and their totals."""
 
 import base64
 import math
@@ -25,7 +25,7 @@ UNIX_TIMES_FROM = 1e9
 
 @dataclass(frozen=True)
 class CleanedScan:
-    """What was done to one scan.
+    """The result of cleaning one scan.
 
     Attributes:
         scan: Its file.
@@ -33,10 +33,10 @@ class CleanedScan:
         valid: Number of points that can be judged.
         rain: Number of removed points.
         share_removed: Share of ``rain`` in ``valid``.
-        not_known: Number of valid points of which the method is not sure; None for a method that
+        not_known: Number of valid points that the method is not sure of; None for a method that
             does not report doubt.
         milliseconds: Time of each stage.
-        warnings: What is odd about the scan.
+        warnings: Warnings about the scan.
         weather: Its weather; None unless every scan is measured.
     """
 
@@ -66,13 +66,13 @@ class CleanedScan:
 
 @dataclass(frozen=True, eq=False)
 class ScanOutcome:
-    """What became of one scan of a source.
+    """The outcome of one scan of a source.
 
     Attributes:
         frame: The scan.
-        issues: What is odd about it.
-        cleaned: What was done to it; None where it could not be cleaned.
-        seconds: When it was taken, seconds; None where that is not known.
+        issues: Warnings about it.
+        cleaned: Its results; None if it could not be cleaned.
+        seconds: Its time, seconds; None if unknown.
         packed: The weather that it shows, as text; None where it was not measured.
         error: Why it could not be cleaned; None where it was.
         recording: The unbroken recording that it is of, where only its unit shows that.
@@ -90,7 +90,7 @@ class ScanOutcome:
 
     @property
     def figures(self) -> CleanedScan:
-        """What was done to a scan that was cleaned."""
+        """The figures of a cleaned scan."""
         assert self.cleaned is not None
         return self.cleaned
 
@@ -149,7 +149,7 @@ class CleanedTotals:
         """The hours with the shortest visibility, the worst first.
 
         Args:
-            most: At most so many.
+            most: The largest number.
         """
         known = [each for each in self.by_hour.items() if each[1].visibility.known]
         return sorted(known, key=lambda each: each[1].visibility.shown)[:most]

@@ -26,7 +26,7 @@ from derain.views.scan_issues import MOST_RAIN, ScanIssue
 
 @dataclass(frozen=True)
 class CleanReport:
-    """What was done to the scans of a source, as :func:`clean` returns it.
+    """The results of :func:`clean` for the scans of a source.
 
     Example:
         >>> report = derain.clean("scan.bin", derain.FilterDerainer(derain.DROR()), "cleaned")
@@ -66,7 +66,7 @@ class CleaningObserver:
         """Called for each judged scan before it is written, where no records are kept."""
 
     def noticed(self, scan: str, odd: list[ScanIssue]) -> None:
-        """Called for each judged scan with what is odd about it."""
+        """Called for each judged scan with warnings about it."""
 
     def cleaned(self, outcome: ScanOutcome) -> None:
         """Called for each scan that is written."""
@@ -107,10 +107,10 @@ def clean(
             them, such as :class:`derain.recordings.posed.Odometry`. None leaves the frames as they
             are.
         most_removed: Scans with a greater share of rain in their valid points are not written.
-        weather: How the weather is measured.
+        weather: Options for measuring the weather.
         observer: Follows the cleaning.
-        division: How the scans are divided into units. Where there are more scans than a block has,
-            a record of each unit is kept in the folder, by which a run that was stopped goes on.
+        division: Division of the scans into units. Where there are more scans than a block has,
+            a record of each unit is kept in the folder, from which a run that was stopped resumes.
             None keeps no records, unless there is an executor, or a source or a sink in an object
             store.
         executor: Does the units: an executor of :mod:`concurrent.futures` or the like, whose
@@ -180,7 +180,7 @@ def clean(
 
 
 def _is_stored(source: Source, sink: CleanSink) -> bool:
-    """Whether scans are read from an object store, or written to one."""
+    """True if scans are read from an object store, or written to one."""
     return sink.destination.is_stored or any(isinstance(each, StoredFrame) for each in source)
 
 

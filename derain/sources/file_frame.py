@@ -37,17 +37,17 @@ class FileFrame(Frame):
 
     @property
     def name(self) -> str:
-        """What messages call it: its path, or the URL that it stands for."""
+        """Its name in messages: its path, or the URL that it stands for."""
         return url_of(self.path)
 
     @property
     def suffix(self) -> str:
-        """What follows the stem in the name of its file."""
+        """The suffix of its file, after the stem."""
         return self.path.name[len(scan_stem(self.path)) :]
 
     @property
     def time(self) -> float | None:
-        """When it was taken, seconds: see :class:`~derain.sources.records.Records`."""
+        """Time at which it was taken, seconds: see :class:`~derain.sources.records.Records`."""
         return None if self.records is None else self.records.time_of(self.path)
 
     @property
@@ -59,7 +59,7 @@ class FileFrame(Frame):
 
     @property
     def has_labels(self) -> bool:
-        """Whether a file of labels is where they should be."""
+        """True if a file of labels is where they should be."""
         return self.label_path is not None and self.label_path.is_file()
 
     def read(self) -> Scan:

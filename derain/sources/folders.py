@@ -67,12 +67,12 @@ def named_frames(
             (:func:`~derain.sources.bag_frame.bag_frames`); folders of recordings, in which all of
             these are found at any depth; or ``example``, which comes with derain.
         columns: Names of the columns of files that do not name them.
-        labelled: Whether labels are to be read, from where :func:`~derain.cards.known.label_of`
-            finds them by the layouts.
+        labelled: True to read labels, from the place that :func:`~derain.cards.known.label_of`
+            finds by the layouts.
         layouts: What the folders of data sets may be called, the likeliest first; by default as in
             the packaged data cards. An empty sequence takes neither data sets nor folders of
             recordings.
-        recordings: Whether each folder is a recording, which numbers its scans as others do.
+        recordings: True if each folder is a recording, which numbers its scans as others do.
         topic: Topic of the bags among them; None where each has only one of clouds.
 
     Returns:
@@ -96,9 +96,9 @@ class FrameFinder:
 
     Attributes:
         columns: Names of the columns of files that do not name them.
-        labelled: Whether labels are to be read.
+        labelled: True to read labels.
         layouts: What the folders of data sets may be called.
-        recordings: Whether each folder is a recording.
+        recordings: True if each folder is a recording.
         topic: Topic of the bags.
         frames_of_bag: Gives the clouds of each bag.
     """
@@ -396,7 +396,7 @@ def _several_folders(scans: Iterable[Path]) -> bool:
 
 
 def _holds_scans(folder: Path) -> bool:
-    """Whether scans lie directly in a folder, not only texts that may be something else.
+    """True if scans lie directly in a folder, not only texts that may be something else.
 
     It ends at the first of them: a folder of a hundred thousand scans is not listed twice.
     """

@@ -19,13 +19,13 @@ class Frame(ABC):
     """A scan that a source can give, in its place in time and space.
 
     Attributes:
-        key: What is made of it is named by this: a relative path without a suffix, such as
+        key: Name of its results: a relative path without a suffix, such as
             ``000012`` or ``03/velodyne/000012``, which no other frame of its source has.
         sequence: Name of the recording that it belongs to; frames of one sequence are of one
             sensor, one after the other.
         number: Its place in its sequence, from 0.
-        label_path: Where its labels are, or should be; None where none are to be read.
-        intensity_scale: What takes its intensities to the unit in which they are to be seen.
+        label_path: Path of its labels, existing or not; None if none are to be read.
+        intensity_scale: Factor from its intensities to the required unit.
         sensor_to_world: Its pose, float64 (4, 4), metres, where it is given; None leaves it to
             what lies beside the scan.
         label_map: Takes its labels to the classes of several data sets that it is one of; None
@@ -43,7 +43,7 @@ class Frame(ABC):
     @property
     @abstractmethod
     def name(self) -> str:
-        """What messages call it, such as the path of its file."""
+        """Its name in messages, such as the path of its file."""
 
     @property
     @abstractmethod
@@ -52,7 +52,7 @@ class Frame(ABC):
 
     @property
     def time(self) -> float | None:
-        """When it was taken, seconds of the recording's clock; None where it is not known.
+        """Time at which it was taken, seconds of the recording's clock; None where it is not known.
 
         Raises:
             InputError: A record of times that is damaged or does not fit the scans.
@@ -73,7 +73,7 @@ class Frame(ABC):
     @property
     @abstractmethod
     def has_labels(self) -> bool:
-        """Whether its labels are there to be read."""
+        """True if its labels are there to be read."""
 
     def require_labels(self) -> None:
         """Refuses a scan without labels, where they are needed.
@@ -147,14 +147,14 @@ class Frame(ABC):
 
     @abstractmethod
     def stamp(self) -> str:
-        """What changes when the scan does, or a record of its time and pose, without reading it.
+        """A stamp that changes with the scan or its record of time and pose, read without the scan.
 
         Raises:
             InputError: A file that is not there.
         """
 
     def follows(self, other: "Frame") -> bool:
-        """Whether it is the next of the same recording, with none between."""
+        """True if it is the next of the same recording, with none between."""
         return self.sequence == other.sequence and self.number == other.number + 1
 
     def without_labels(self) -> Self:
@@ -176,7 +176,7 @@ class Frame(ABC):
         :meth:`derain.scan.Scan.with_intensity_times`.
 
         Args:
-            factor: What takes them there, such as 255 from 0..1 to 0..255.
+            factor: The factor, such as 255 from 0..1 to 0..255.
         """
         return replace(self, intensity_scale=self.intensity_scale * factor)
 
@@ -187,8 +187,8 @@ class MemoryFrame(Frame):
 
     Attributes:
         scan: The scan.
-        seconds: When it was taken, seconds; None where that is not known.
-        reads_labels: Whether its labels are to be read.
+        seconds: Its time, seconds; None if unknown.
+        reads_labels: True if its labels are to be read.
     """
 
     scan: Scan
@@ -197,7 +197,7 @@ class MemoryFrame(Frame):
 
     @property
     def name(self) -> str:
-        """What messages call it: as its scan is called."""
+        """Its name in messages: as its scan is called."""
         return self.scan.name
 
     @property
@@ -207,12 +207,12 @@ class MemoryFrame(Frame):
 
     @property
     def time(self) -> float | None:
-        """When it was taken, as it was given."""
+        """Time at which it was taken, as it was given."""
         return self.seconds
 
     @property
     def has_labels(self) -> bool:
-        """Whether its scan has labels that are to be read."""
+        """True if its scan has labels that are to be read."""
         return self.reads_labels and self.scan.label is not None
 
     def read(self) -> Scan:
@@ -255,7 +255,7 @@ class MemoryFrame(Frame):
 
 
 def time_of(frame: Frame) -> float | None:
-    """When a frame was taken, seconds; None without a record, or with a damaged one."""
+    """Time at which a frame was taken, seconds; None without a record, or with a damaged one."""
     try:
         return frame.time
     except InputError:

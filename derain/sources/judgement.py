@@ -41,7 +41,7 @@ class Judgement:
 
     @property
     def answered(self) -> NDArray[np.bool_]:
-        """True for rows that were judged, and for sure where the method knows doubt, bool (N,)."""
+        """True for rows that were judged, and with certainty, bool (N,)."""
         return self.judged if self.known is None else self.judged & self.known
 
     @property
@@ -51,5 +51,5 @@ class Judgement:
 
     @cached_property
     def weather(self) -> ScanWeather:
-        """How bad the weather is that the scan shows: where its rays meet rain, and how far on."""
+        """The weather of the scan: where its rays meet rain, and at what range."""
         return ScanWeather.of(self.scan, self.rain)

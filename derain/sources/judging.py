@@ -23,12 +23,12 @@ AnswerOrError = tuple[Frame, Judgement | InputError, Stopwatch]
 
 
 def unguarded(frame: Frame) -> AbstractContextManager[None]:
-    """Lets whatever is wrong with a frame end the whole work."""
+    """Lets any error of a frame end the whole work."""
     return nullcontext()
 
 
 class Failures:
-    """Holds back what is wrong with single frames, so that the others go on.
+    """Collects the errors of single frames, so that the others go on.
 
     Args:
         report: Called with each error.
@@ -46,7 +46,7 @@ class Failures:
         """Reports and keeps the error of the block.
 
         Args:
-            frame: What the block works on.
+            frame: Frame that the block works on.
         """
         try:
             with reading(Path(frame.name)):  # which names the file where the memory is full

@@ -1,4 +1,4 @@
-"""What every method does that judges the frames of a recording."""
+"""The base class of methods that judge the frames of a recording."""
 
 import json
 import sys
@@ -25,7 +25,7 @@ EXAMINE_EVERY = 100
 
 
 class Method(ABC):
-    """Says which points of a recording are rain: a model, a filter, or what sees several scans.
+    """Finds the points of rain in a recording: a model, a filter, or a method of several scans.
 
     Frames go in by :meth:`push`, one after the other. A method that sees one scan at a time answers
     at once; one that needs scans after the one that it judges answers when they are there, and for
@@ -41,7 +41,7 @@ class Method(ABC):
 
     Attributes:
         EXAMINE_EVERY: One scan in so many is examined for what :meth:`issues` gives.
-        warns: Whether it warns of that, by :class:`~derain.errors.ScanWarning`. What prints the
+        warns: True if it warns of that, by :class:`~derain.errors.ScanWarning`. What prints the
             issues itself sets it to False.
     """
 
@@ -53,21 +53,21 @@ class Method(ABC):
     @property
     @abstractmethod
     def window(self) -> Window:
-        """How many scans it needs before and after the one that it judges."""
+        """Number of scans that it needs before and after the one that it judges."""
 
     @property
     def gives_probabilities(self) -> bool:
-        """Whether it gives the probability of rain, and not only which points are rain."""
+        """True if it gives the probability of rain, and not only which points are rain."""
         return True
 
     @property
     @abstractmethod
     def waiting(self) -> int:
-        """How many frames were pushed and are not answered for."""
+        """Number of frames that were pushed and not answered."""
 
     @abstractmethod
     def starts_new_recording(self, frame: Frame) -> bool:
-        """Whether pushing a frame would drop those that wait, because it does not follow them."""
+        """True if pushing a frame would drop those that wait, because it does not follow them."""
 
     @abstractmethod
     def push(
@@ -75,8 +75,8 @@ class Method(ABC):
     ) -> Judgement | None:
         """Takes the next frame of a recording.
 
-        A frame of another sequence, or after a gap, starts anew: call :meth:`flush` before it, or
-        the frames that still wait are dropped.
+        A frame of another sequence, or after a gap, starts a new recording: call :meth:`flush`
+        before it, or the frames that still wait are dropped.
 
         Args:
             frame: A frame, which is read; or a Scan, or (N, ≥ 3) numbers: x, y, z in metres in the
@@ -107,7 +107,7 @@ class Method(ABC):
 
     @abstractmethod
     def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
-        """What is odd about a scan that it judged, as far as that matters to the method.
+        """Warnings about a scan that it judged, as far as that matters to the method.
 
         Args:
             judgement: Its judgement of the scan.
@@ -134,7 +134,7 @@ class Method(ABC):
         return set()
 
     def depends_on(self, recording: Sequence[Frame]) -> Window | None:
-        """How far its answer for one scan of a recording depends on the scans around it.
+        """Number of scans around one on which its answer depends.
 
         Args:
             recording: Frames of which each follows the one before it.
@@ -145,7 +145,7 @@ class Method(ABC):
         return None
 
     def fingerprint(self) -> str:
-        """A fingerprint of what it calls rain: of its parameters, and of its weights if it has any.
+        """A fingerprint of its answers: of its parameters, and of its weights if it has any.
 
         It is 16 hexadecimal digits.
         """
@@ -153,7 +153,7 @@ class Method(ABC):
 
     @abstractmethod
     def as_dict(self) -> dict[str, Any]:
-        """What it takes to make it again: ``method``, its name, and its parameters.
+        """The settings to make it again: ``method``, its name, and its parameters.
 
         Texts, finite numbers, true, false, or nothing; or lists and mappings of these.
         """

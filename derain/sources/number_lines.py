@@ -18,7 +18,7 @@ def read_numbers(path: Path, *columns: int) -> NDArray[np.float64]:
 
     Args:
         path: The file.
-        columns: How many numbers a line may have; the first line decides which of them.
+        columns: Permitted numbers of values in a line; the first line selects one.
 
     Returns:
         float64 (T, columns); of a file without lines, as many as are named last.
@@ -53,8 +53,8 @@ def finite_numbers(path: Path, place: int, words: Sequence[str], count: int) -> 
     Args:
         path: The file.
         place: Number of the line, for messages.
-        words: What stands in it.
-        count: How many it has to be.
+        words: The text of the line, split.
+        count: Number of values that it must have.
 
     Raises:
         InputError: Something else.

@@ -1,4 +1,4 @@
-"""How the scan of a frame is read for a model or a measurement: in its unit, with its labels."""
+"""Reads the scan of a frame for a model or a measurement: in its unit, with its labels."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,8 +20,8 @@ class FrameReader:
 
     Attributes:
         card: Says which labels there are.
-        intensity_scale: What takes the scans' intensities to the unit of the card.
-        columns: Which columns to keep besides those that every scan has: to a model, the others
+        intensity_scale: Factor from the scans' intensities to the unit of the card.
+        columns: Columns to keep besides those of every scan: to a model, the others
             would only cost memory. None keeps all.
     """
 
@@ -58,7 +58,7 @@ class FrameReader:
         return scan.take(first_rows(scan))
 
     def with_labels(self, scan: Scan, frame: Frame) -> Scan:
-        """The scan with the labels of its frame, none of which the data card does not know."""
+        """The scan with the labels of its frame, all of which are on the data card."""
         label = frame.read_label(len(scan))
         if frame.label_map is not None:
             label = frame.label_map(label, str(frame.label_path or frame.name))

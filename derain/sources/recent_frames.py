@@ -63,7 +63,7 @@ class RecentFrames:
     """Takes frame after frame, and gives each back once those after it are there.
 
     A frame that does not follow the one before it, in another sequence or with some missing
-    between, starts anew: no window reaches over the gap.
+    between, starts a new recording: no window reaches over the gap.
 
     Args:
         window: Frames before and after one that are to be seen with it.
@@ -76,7 +76,7 @@ class RecentFrames:
 
     @property
     def waiting(self) -> int:
-        """How many frames were taken and not given back."""
+        """Number of frames that were taken and not given back."""
         return len(self._kept) - self._given
 
     @property
@@ -85,11 +85,11 @@ class RecentFrames:
         return self._kept[-1][0].number + 1 if self._kept else 0
 
     def starts_new_recording(self, frame: Frame) -> bool:
-        """Whether a frame does not follow those that were taken."""
+        """True if a frame does not follow those that were taken."""
         return bool(self._kept) and not frame.follows(self._kept[-1][0])
 
     def push(self, frame: Frame, placed: PlacedScan) -> FrameInWindow | None:
-        """Takes the next frame; where it starts anew, those still waiting are dropped.
+        """Takes the next frame; a new recording drops those still waiting.
 
         Args:
             frame: The frame.

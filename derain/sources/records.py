@@ -1,4 +1,4 @@
-"""When and where the scans of a folder were taken: the records that lie beside them.
+"""Times and poses of the scans of a folder, from the records that lie beside them.
 
 - ``times.txt``: a line a scan, seconds. Or ``metadata.csv``, see :mod:`derain.files.frame_times`.
 - ``poses.txt``: a line a scan, or poses by time; see :mod:`derain.sources.trajectory`.
@@ -36,7 +36,7 @@ class Records:
         self.folder = folder
 
     def time_of(self, scan: Path) -> float | None:
-        """When a scan of the folder was taken, seconds; None if not known.
+        """Time at which a scan of the folder was taken, seconds; None if not known.
 
         Raises:
             InputError: A record that is damaged or does not fit the scans.
@@ -141,10 +141,10 @@ def line_of(record: Path, lines: int, scan: str, place: int | None, scans: int) 
 
     Args:
         record: The record, for messages.
-        lines: How many it has.
+        lines: Number of lines that it has.
         scan: Name of the scan's file.
         place: The scan's place among all of its sequence; None where it is not one of them.
-        scans: How many there are.
+        scans: Their number.
 
     Raises:
         InputError: There is no such line.

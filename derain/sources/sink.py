@@ -24,8 +24,8 @@ class FolderSink:
 
     Args:
         folder: The folder, made if missing.
-        option: What a user calls it, for messages.
-        again: Whether a source may give a scan twice, as where two patterns find it.
+        option: The user's name for it, for messages.
+        again: True if a source may give a scan twice, as where two patterns find it.
         removed: Folder for what is taken away of the scans, named like these; None to drop it.
     """
 
@@ -38,17 +38,17 @@ class FolderSink:
         self.again = again
 
     def scan_path(self, frame: Frame) -> Path:
-        """Where a scan is written; one that came from no file is written as a PCD."""
+        """The file that a scan is written to; one that came from no file is written as a PCD."""
         return self.folder / f"{frame.key}{frame.suffix or '.pcd'}"
 
     def removed_path(self, frame: Frame) -> Path | None:
-        """Where what is taken away of a scan is written; None where it is dropped."""
+        """The file that the removed points of a scan are written to; None if they are dropped."""
         if self.removed is None:
             return None
         return self.removed / self.scan_path(frame).relative_to(self.folder)
 
     def path(self, frame: Frame, suffix: str) -> Path:
-        """Where anything else that is made of a scan is written, such as its labels."""
+        """The file for any other result of a scan, such as its labels."""
         return self.folder / f"{frame.key}{suffix}"
 
     def files_of(self, frame: Frame) -> list[Path]:
@@ -91,9 +91,9 @@ class FolderSink:
 
         Args:
             frame: The frame.
-            scan: What is left of the scan; None where only labels are of interest.
+            scan: The cleaned scan; None where only labels are of interest.
             label: Class ids or a bool mask of the scan that the labels are for, (N,).
-            removed: What was taken away of the scan; None where it is dropped.
+            removed: The removed points of the scan; None where it is dropped.
 
         Raises:
             InputError: It cannot be written.
@@ -138,7 +138,7 @@ class LabelSink(FolderSink):
 
     Args:
         folder: The folder, made if missing.
-        option: What a user calls it, for messages.
+        option: The user's name for it, for messages.
     """
 
     def refuse_clashes(self, source: Iterable[Frame]) -> None:
@@ -161,7 +161,7 @@ class LabelSink(FolderSink):
 
 
 def _is_result(frame: FileFrame, folder: Path) -> bool:
-    """Whether a scan of a folder of recordings lies in the results, which are one of them."""
+    """True if a scan of a folder of recordings lies in the results, which are one of them."""
     path, results = os.path.abspath(frame.path), os.path.abspath(folder)
     if not path.startswith(f"{results}/"):
         return False
@@ -170,7 +170,7 @@ def _is_result(frame: FileFrame, folder: Path) -> bool:
 
 
 def _is_same(one: Path, other: Path) -> bool:
-    """Whether two paths are of one file or folder, whatever they are written like."""
+    """True if two paths lead to one file or folder."""
     return _real(one) == _real(other)
 
 
@@ -188,12 +188,12 @@ def _real_folder(folder: str) -> str:
 
 
 def _is_one_file(one: Frame, other: Frame) -> bool:
-    """Whether two frames are of the same file, so that what is made of them is the same."""
+    """True if two frames are of the same file, so that what is made of them is the same."""
     return isinstance(one, FileFrame) and isinstance(other, FileFrame) and one.name == other.name
 
 
 def _labels_of(frames: Iterable[Frame]) -> Iterator[Path]:
-    """Where the labels of files are, or would be looked for."""
+    """Paths at which the labels of files are looked for."""
     for frame in frames:
         if isinstance(frame, FileFrame):
             places = (frame.label_path, label_beside(frame.path), beside(frame.path, LABEL))

@@ -1,4 +1,4 @@
-"""Where scans come from: frames in time order."""
+"""Sources of scans: frames in time order."""
 
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, overload
@@ -37,7 +37,7 @@ class Frames(Sequence[Frame]):
         Args:
             scans: The scans, or arrays of points as :meth:`derain.scan.Scan.of` takes them, in time
                 order.
-            sequence: What the sequence is called; its frames have keys such as ``drive/000001``.
+            sequence: Name of the sequence; its frames have keys such as ``drive/000001``.
 
         Raises:
             InputError: Something that is neither a scan nor an array of points.

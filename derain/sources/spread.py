@@ -13,7 +13,7 @@ def evenly_spaced(items: Sequence[Item], most: int) -> list[Item]:
 
     Args:
         items: The items, in order.
-        most: How many, where there are so many.
+        most: The largest number.
     """
     numbers = np.linspace(0, len(items) - 1, min(most, len(items))).round().astype(int)
     return [items[number] for number in numbers]

@@ -132,7 +132,7 @@ class _Listing:
         return self._stamps[folder]
 
     def _recorded(self, value: Callable[[], Value]) -> Value | InputError:
-        """What a record has, or the error of a damaged one."""
+        """The content of a record, or the error of a damaged one."""
         try:
             return value()
         except InputError as error:

@@ -24,10 +24,10 @@ Value = TypeVar("Value")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StoredFrame(FileFrame):
-    """What lies in an object store; its path only names it.
+    """A frame in an object store; its path only names it.
 
     Attributes:
-        objects: What is to be fetched.
+        objects: The objects to fetch.
     """
 
     objects: tuple[StoredObject, ...]
@@ -37,7 +37,7 @@ class StoredFrame(FileFrame):
         """The frames that it stands for, of which all is on this machine.
 
         Args:
-            where: Where its objects are.
+            where: Place of its objects.
 
         Raises:
             InputError: A bag that cannot be read.
@@ -57,10 +57,10 @@ class StoredScan(StoredFrame):
     """A scan in an object store. Each time it is read, it is fetched.
 
     Attributes:
-        recorded: When it was taken, and its pose, as the records beside it have them: the value, or
+        recorded: Its time and pose, from the records beside it: the value, or
             the error of a damaged record.
         records_stamp: Changes when these records do.
-        file: Where it is on this machine while it is fetched.
+        file: Its path on this machine while it is fetched.
     """
 
     recorded: tuple[
@@ -72,7 +72,7 @@ class StoredScan(StoredFrame):
 
     @property
     def time(self) -> float | None:
-        """When it was taken, seconds."""
+        """Time at which it was taken, seconds."""
         return _value(self.recorded[0])
 
     @property
@@ -109,7 +109,7 @@ class StoredBag(StoredFrame):
     Attributes:
         inner: The topic, as a part of a path; empty where the bag has only one of clouds.
         prefix: First part of the keys of its clouds; empty where the bag is the only one.
-        seconds: When the cloud was taken that it stands for; None where it stands for all.
+        seconds: Time of the cloud; None for all clouds.
         trajectory: Poses of the clouds, where they are given.
     """
 
@@ -131,7 +131,7 @@ class StoredBag(StoredFrame):
 
     @property
     def time(self) -> float | None:
-        """When the cloud was taken, seconds."""
+        """Time at which the cloud was taken, seconds."""
         return self.seconds
 
     def fetched(self, where: Mirror) -> list[FileFrame]:
@@ -155,16 +155,16 @@ class StoredBag(StoredFrame):
 
     def stamp(self) -> str:
         """Sizes and versions of its objects, and a fingerprint of the poses that are given."""
-        given = "" if self.trajectory is None else self.trajectory.fingerprint()
-        return f"{super().stamp()} {given}"
+        poses = "" if self.trajectory is None else self.trajectory.fingerprint()
+        return f"{super().stamp()} {poses}"
 
     def cloud(self, key: str, name: str, seconds: float | None) -> Self:
         """One of its clouds, of which only that is known.
 
         Args:
             key: Its key.
-            name: What messages call it.
-            seconds: When it was taken, seconds; None where that is not known.
+            name: Its name in messages.
+            seconds: Its time, seconds; None if unknown.
         """
         return replace(self, key=key, path=path_of(name), seconds=seconds)
 
@@ -174,7 +174,7 @@ class StoredBag(StoredFrame):
 
 
 def _value(recorded: Value | InputError) -> Value:
-    """What a record has.
+    """The content of a record.
 
     Raises:
         InputError: It is damaged.

@@ -1,4 +1,4 @@
-"""Which scans a network was trained on, so that it is not measured on them unawares.
+"""The record of the scans that a network was trained on, so that none is measured unawares.
 
 Sequences of a published data set are recorded by their names, and all other scans by fingerprints
 of their files: folders of different data may be named the same.
@@ -40,7 +40,7 @@ def record_of_scans(frames: Sequence[Frame]) -> dict[str, tuple[str, ...]]:
 def record_of_parts(
     records: Iterable[tuple[str, Mapping[str, Sequence[str]]]],
 ) -> dict[str, tuple[str, ...]]:
-    """Record of a training on several data sets, each of which has a record of its own.
+    """Record of a training on several data setswith a record each.
 
     Args:
         records: Name of each data set, and its record; there may be several of one name.
@@ -61,7 +61,7 @@ def training_overlap(title: str, spec: Spec, card: DataCard, frames: Sequence[Fr
     """The warning about a model that was trained on some of the scans it is measured on.
 
     Args:
-        title: What the model is called.
+        title: Name of the model.
         spec: Its Spec.
         card: Data card of the scans.
         frames: The scans.
@@ -81,7 +81,7 @@ def training_overlap(title: str, spec: Spec, card: DataCard, frames: Sequence[Fr
         return None
     return (
         f"{title} was trained on {len(known):,} of these {len(frames):,} scans, such as "
-        f"{known[0].name}: its scores say little of others"
+        f"{known[0].name}: its scores do not predict those on others"
     )
 
 
@@ -94,5 +94,5 @@ def _trained_on(
 
 
 def _sequences_of(data: str) -> str:
-    """What the sequences of one of several data sets are entered under."""
+    """The key of one data set's sequences among those of several."""
     return f"{SEQUENCES} of {data}"

@@ -1,4 +1,4 @@
-"""Where a sensor was, in files of two forms.
+"""Poses of a sensor, in files of two formats.
 
 - KITTI's: twelve numbers a line, the upper three rows of a pose, row by row. With a ``calib.txt``
   beside it they are poses of the camera that it names ``Tr`` for; without one, the sensor's own.
@@ -47,8 +47,8 @@ class Trajectory:
 
     Attributes:
         poses: Sensor to world, float64 (T, 4, 4), metres.
-        times: When it was there, seconds, ascending, float64 (T,); None where that is not known.
-        name: What messages call it, such as its file.
+        times: Times of the poses, seconds, ascending, float64 (T,); None if unknown.
+        name: Its name in messages, such as its file.
     """
 
     poses: NDArray[np.float64]
@@ -64,10 +64,10 @@ class Trajectory:
         return sha256(self.poses.tobytes() + times).hexdigest()
 
     def is_by_time(self, times: Sequence[float] | NDArray[np.float64]) -> bool:
-        """Whether scans find their poses by time: both have times, of one clock it seems.
+        """True if scans find their poses by time: both have times, of one clock it seems.
 
         Args:
-            times: When the scans were taken, seconds, (N,).
+            times: Times of the scans, seconds, (N,).
         """
         if self.times is None or not len(self.times) or not len(times):
             return False
@@ -79,7 +79,7 @@ class Trajectory:
 
         Args:
             time: Seconds.
-            scan: What was taken then, for messages.
+            scan: Name of the scan of that time, for messages.
 
         Returns:
             Sensor to world, float64 (4, 4), metres.
@@ -268,7 +268,7 @@ def slerp(
     Args:
         first: Unit quaternion x, y, z, w, float64 (4,).
         second: The other one.
-        share: How far on the way, 0..1.
+        share: Share of the way, 0..1.
 
     Source: K. Shoemake, "Animating Rotation with Quaternion Curves", SIGGRAPH 1985.
     """

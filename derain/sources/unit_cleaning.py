@@ -28,10 +28,10 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
     """Cleans the scans of one unit after the other.
 
     Attributes:
-        destination: Where they are written, and what is written of them.
+        destination: Folder and form of the written scans.
         most_removed: Scans with a greater share of rain in their valid points are not written.
         measured: Keys of the scans whose weather is measured; None measures all.
-        finds_recordings: Whether only the unit shows which of its scans follow one another.
+        finds_recordings: True if only the unit shows which of its scans follow one another.
     """
 
     destination: Destination
@@ -64,11 +64,11 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
 
         Args:
             unit: The unit.
-            sink: Where they are written.
+            sink: The file or folder to write to.
             on_judgement: Receives each judgement.
 
         Yields:
-            What became of each scan.
+            Outcomes of all scans.
         """
 
         def result(frame: Frame, judgement: Judgement, stopwatch: Stopwatch) -> ScanOutcome:
@@ -140,9 +140,9 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
         if share > self.most_removed:
             error = InputError(
                 frame.name,
-                f"left whole, for {share:.1%} of its valid points are called rain, where the "
-                f"heaviest rain has {HEAVIEST_RAIN:.0%}",
-                "See whether the method suits sensor and unit of intensity, or raise "
+                f"left whole: {share:.1%} of its valid points are called rain, and the heaviest "
+                f"rain has {HEAVIEST_RAIN:.0%}",
+                "Check that the method suits the sensor and its unit of intensity, or raise "
                 "--most-removed.",
             )
             return ScanOutcome(frame, issues, error=error)

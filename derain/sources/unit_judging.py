@@ -1,4 +1,4 @@
-"""Judges the scans of one unit, and what a job has to know of it."""
+"""Judges the scans of one unit, and lists the options that its results depend on."""
 
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -29,7 +29,7 @@ class UnitJudging(Work[FrameUnit, ResultT]):
     """Work that judges the scans of a unit one after the other.
 
     Attributes:
-        method: What judges them.
+        method: Method that judges them.
         fingerprint: That of the method where the job began.
         placing: Finds the poses of the scans; None leaves them as they are.
     """
@@ -43,7 +43,7 @@ class UnitJudging(Work[FrameUnit, ResultT]):
         if self.method.fingerprint() != self.fingerprint:
             raise InputError(
                 str(self.method.as_dict()["method"]),
-                "is not the same here as where the run began",
+                "differs from the file that the run started with",
                 "Copy the file to every machine.",
             )
 
@@ -104,7 +104,7 @@ class UnitJudging(Work[FrameUnit, ResultT]):
         return replace(unit, frames=tuple(frames)), issues
 
     def options(self, command: str, source: Sequence[Frame], block: int) -> dict[str, Any]:
-        """What the answers depend on but the scans, for the job of a command.
+        """The options that the answers depend on besides the scans, for the job of a command.
 
         Args:
             command: Name of the command.

@@ -30,7 +30,7 @@ BLOCK = 50
 
 @dataclass(frozen=True)
 class Division:
-    """How a source is divided into units.
+    """The division of a source into units.
 
     Example:
         >>> report = derain.clean(
@@ -42,8 +42,8 @@ class Division:
     Attributes:
         block: Scans of a block of a long recording.
         shard: The shard of the units that is done; None for all.
-        keep_records: Whether records are kept even of fewer scans than a block has.
-        anew: Whether everything is done again, whatever the records of the folder are of.
+        keep_records: True if records are kept even of fewer scans than a block has.
+        anew: True if everything is done again, even if the records are of other options.
     """
 
     block: int = BLOCK
@@ -52,23 +52,23 @@ class Division:
     anew: bool = False
 
     def keeps_records(self, source: Sequence[Frame], folder: Place) -> bool:
-        """Whether there is a record of each unit: it is asked for, or begun, or takes long.
+        """True if each unit has a record: on request, for a run begun before, or for many scans.
 
         Args:
             source: The scans.
             folder: The folder of the results.
         """
-        asked = self.keep_records or self.anew or self.shard is not None
-        return asked or len(source) > self.block or Job.is_begun(folder)
+        requested = self.keep_records or self.anew or self.shard is not None
+        return requested or len(source) > self.block or Job.is_begun(folder)
 
     def begin(
         self, folder: Place, options: Mapping[str, Any], units: "list[FrameUnit]"
     ) -> "tuple[Job, list[FrameUnit]]":
-        """Begins a job, or goes on with the one of the folder.
+        """Starts a job, or resumes the one of the folder.
 
         Args:
             folder: The folder of the results.
-            options: What the results depend on but the inputs.
+            options: Options that the results depend on besides the inputs.
             units: All units.
 
         Returns:
@@ -146,7 +146,7 @@ def units_of(source: Sequence[Frame], method: Method | None, block: int = BLOCK)
 
     Args:
         source: Frames in time order, one recording after the other.
-        method: What judges them; None where each scan is seen by itself.
+        method: Method that judges them; None where each scan is seen by itself.
         block: Scans of a block.
 
     Returns:
@@ -156,12 +156,12 @@ def units_of(source: Sequence[Frame], method: Method | None, block: int = BLOCK)
 
 
 def whole(source: Sequence[Frame]) -> FrameUnit:
-    """All frames of a source as one unit, of which no record is kept."""
+    """All frames of a source as one unit, without a record."""
     return FrameUnit(id="", size=0, inputs="", frames=tuple(source))
 
 
 def shared_options(command: str, source: Sequence[Frame], block: int) -> dict[str, Any]:
-    """What the results of any command depend on but the content of the scans, for its job.
+    """The options that the results of any command depend on besides the scans, for its job.
 
     Args:
         command: Name of the command.
@@ -196,7 +196,7 @@ Span = tuple[Sequence[Frame], int, int, Window]
 
 
 def spans_of(source: Sequence[Frame], method: Method | None, block: int) -> list[Span]:
-    """Where the units of a source begin and end; arguments as for :func:`units_of`."""
+    """Begin and end of each unit of a source; arguments as for :func:`units_of`."""
     return [span for each in recordings_of(source) for span in _spans_of(each, method, block)]
 
 
@@ -232,8 +232,8 @@ def _size(frame: Frame) -> int:
 
 def _stamp(frame: Frame) -> str:
     """The frame's name, and what changes when its file or its pose does."""
-    given = frame.sensor_to_world
-    pose = "" if given is None else sha256(given.tobytes()).hexdigest()
+    matrix = frame.sensor_to_world
+    pose = "" if matrix is None else sha256(matrix.tobytes()).hexdigest()
     try:
         return f"{frame.key} {frame.stamp()} {pose}"
     except InputError:

@@ -19,13 +19,13 @@ SAMPLED_SCANS = 5
 
 @dataclass(frozen=True)
 class WeatherOptions:
-    """How the weather of a recording is measured.
+    """Options for measuring the weather of a recording.
 
     Attributes:
-        every_scan: Whether every scan is measured; otherwise SAMPLED_SCANS are, for the weather of
+        every_scan: True if every scan is measured; otherwise SAMPLED_SCANS are, for the weather of
             all scans together.
-        warning: Where the warning begins and ends.
-        error: Where the error begins and ends.
+        warning: Bounds of the warning.
+        error: Bounds of the error.
         hold: Number of scans in a row that change the alarm.
         dry: Reach of dry scans of the same sensor; None without such a reference.
     """
@@ -45,9 +45,9 @@ class WeatherMonitor:
     """Adds up the weather of one scan after the other.
 
     Args:
-        options: How it is measured.
+        options: Options for measuring it.
         source: The scans.
-        knows_recordings: Whether the source shows which scans follow one another.
+        knows_recordings: True if the source shows which scans follow one another.
 
     Attributes:
         total: The weather of all measured scans together.

@@ -46,7 +46,7 @@ class FileDocuments:
         return None
 
     def read_each(self, names: Sequence[str]) -> Iterator[bytes | None]:
-        """The contents of many, each read when it is asked for."""
+        """The contents of many, each read at its first use."""
         yield from map(self.read, names)
 
     def write(self, name: str, text: str) -> None:
@@ -78,7 +78,7 @@ class FileDocuments:
                 os.replace(written, path)
 
     def remove_all(self) -> None:
-        """Removes the folder, at once for whoever reads it."""
+        """Removes the folder, at once for its readers."""
         if not self._folder.exists():
             return
         with writing(self._folder), temporary_folder(self._folder.parent) as temporary:

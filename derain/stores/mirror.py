@@ -28,7 +28,7 @@ class Mirror:
         self._inside = re.compile(rf"{re.escape(str(root))}/({SCHEME}):/")
 
     def path_of(self, url: str) -> Path:
-        """Where an object or a folder lies."""
+        """The path of an object or a folder."""
         return self.root / path_of(url)
 
     def fetch(self, objects: Iterable[StoredObject]) -> None:

@@ -62,7 +62,7 @@ class StoredObject:
 
     @property
     def name(self) -> str:
-        """What messages call it: its URL without secrets."""
+        """Its name in messages: its URL without secrets."""
         return without_secrets(self.url)
 
     @property
@@ -147,7 +147,7 @@ def tried(url: str, request: Callable[[], Result]) -> Result:
     """The result of a request, which is tried several times.
 
     Args:
-        url: What it is about.
+        url: Subject of the message.
         request: Makes the request.
 
     Raises:
@@ -223,7 +223,7 @@ def _fetch(file: Path, stored: StoredObject) -> None:
         filesystem.get_file(key, str(file))
         size = file.stat().st_size
         if stored.size is not None and size != stored.size:
-            raise OSError(f"{size:,} bytes came of the {stored.size:,} that are listed")
+            raise OSError(f"{size:,} bytes arrived of the {stored.size:,} listed")
 
     tried(stored.url, get)
 
@@ -237,12 +237,12 @@ def _is_final(url: str, error: Exception) -> bool:
 
 
 def _is_full(error: Exception) -> bool:
-    """Whether there is no room for a copy on this machine."""
+    """True if there is no room for a copy on this machine."""
     return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
 
 
 def _is_missing(error: FileNotFoundError) -> bool:
-    """Whether a web server has no such file; fsspec raises the same where none answers."""
+    """True if a web server has no such file; fsspec raises the same where none answers."""
     status = getattr(error.__cause__, "status", 404 if error.__cause__ is None else 0)
     return 400 <= status < 500 and status != TOO_MANY_REQUESTS
 
@@ -258,7 +258,7 @@ def _refusal(url: str, error: Exception) -> InputError:
         return InputError(
             without_secrets(url),
             f"there is no room for a copy in {gettempdir()}",
-            "Make room there, or name another folder in TMPDIR.",
+            "Free space there, or name another folder in TMPDIR.",
         )
     if isinstance(error, FileNotFoundError):
         if _is_final(url, error):
@@ -275,5 +275,5 @@ def _refusal(url: str, error: Exception) -> InputError:
     return InputError(
         without_secrets(url),
         f"a request failed {len(WAITS) + 1} times ({reason})",
-        "See whether the store is well, then run the same command again.",
+        "Check the store, then run the same command again.",
     )

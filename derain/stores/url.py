@@ -14,12 +14,12 @@ SCHEME = r"[A-Za-z][A-Za-z0-9+.-]+"
 
 
 def is_url(place: Place) -> bool:
-    """Whether a place is a URL such as ``s3://bucket/drives``."""
+    """True if a place is a URL such as ``s3://bucket/drives``."""
     return isinstance(place, str) and re.match(f"{SCHEME}://", place) is not None
 
 
 def is_web(place: Place) -> bool:
-    """Whether a place is on a web server, which is read and not written."""
+    """True if a place is on a web server, which is read and not written."""
     return isinstance(place, str) and place.startswith(("http://", "https://"))
 
 
@@ -51,7 +51,7 @@ def without_secrets(text: str) -> str:
 
 
 def path_of(url: str) -> Path:
-    """A relative path that stands for a URL, such as ``s3:/bucket/drives``; nothing lies there.
+    """The relative path that represents a URL, such as ``s3:/bucket/drives``; nothing lies there.
 
     Raises:
         InputError: A part of the URL would lead out of its folder.

@@ -1,1 +1,1 @@
-"""The machine: its cores, processes, clocks, libraries, and what is told on its terminal."""
+"""The machine: its cores, processes, clocks, libraries, and notices on its terminal."""

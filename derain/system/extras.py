@@ -38,14 +38,14 @@ class Extra:
 
     @property
     def installed(self) -> bool:
-        """Whether the library is installed; it is not imported."""
+        """True if the library is installed; it is not imported."""
         return find_spec(self.library) is not None
 
     def load(self, subject: str | Path, submodule: str = "") -> ModuleType:
         """Imports the library.
 
         Args:
-            subject: What needs it, for the message: a file, a command.
+            subject: The user of it, for the message: a file, a command.
             submodule: Name of a module within it to import instead.
 
         Raises:
@@ -61,7 +61,7 @@ class Extra:
             raise InputError(
                 subject,
                 f"needs {name}, which cannot be imported ({reason_of(error)})",
-                "Install what it names, or the library anew.",
+                "Install the package that it names, or reinstall the library.",
             ) from error
 
 
@@ -104,7 +104,7 @@ def require(subject: str | Path, *extras: Extra) -> None:
     """Refuses work, before it begins, where libraries that it needs are not installed.
 
     Args:
-        subject: What needs them, for the message: a command, an option, a file.
+        subject: The user of them, for the message: a command, an option, a file.
         extras: The libraries; none is imported.
 
     Raises:

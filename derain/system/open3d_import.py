@@ -77,7 +77,7 @@ def link_libusb() -> Path | None:
 
 
 def _lacking_library() -> tuple[Path, Path] | None:
-    """Where a link belongs, and the library; None where Open3D finds it, or is not there."""
+    """The place of the link, and the library; None if Open3D finds it, or is not installed."""
     open3d = find_spec("open3d")
     if sys.platform != "linux" or open3d is None or open3d.origin is None:
         return None

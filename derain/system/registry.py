@@ -74,7 +74,7 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
                 if former != _origin(member):
                     raise InputError(
                         f"{self.group}: {name}",
-                        f"is the name of two, {former} and {_origin(member)}",
+                        f"is the name of two entries, {former} and {_origin(member)}",
                         "Remove or rename one.",
                     )
             # Members of a module that was imported again replace the former ones.
@@ -163,6 +163,6 @@ def _warn_of_broken(entry: "EntryPoint", error: Exception) -> None:
 
 
 def _origin(member: object) -> str:
-    """Where a member is defined, which stays the same when its module is imported again."""
+    """The module and name of a member, which stay the same when its module is imported again."""
     name = getattr(member, "__qualname__", None)
     return repr(member) if name is None else f"{member.__module__}.{name}"

@@ -23,7 +23,7 @@ def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     instead of waiting for work for ever.
 
     Args:
-        workers: How many.
+        workers: Number of workers.
     """
     others = set(multiprocessing.active_children())
     # Not forked: a fork has the locks of this process, but not the threads that would release them.

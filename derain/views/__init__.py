@@ -1,1 +1,1 @@
-"""What networks and filters see of a scan, and the back-projection to its points."""
+"""Views of a scan for networks and filters, and the back-projection to its points."""

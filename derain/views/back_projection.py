@@ -198,12 +198,12 @@ class _Window:
     def _differences(
         self, pixel: NDArray[np.int64], distance: NDArray[np.float32]
     ) -> Iterator[NDArray[np.float32]]:
-        """What the pixels around each pixel differ from a point in range, step by step."""
+        """Differences in range between the pixels around each pixel and a point, step by step."""
         corner = self._corner(pixel)
         for step in self._steps:
             yield np.abs(self._nearest[step:].take(corner) - distance)
 
     def _corner(self, pixel: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Where in the padded image the window around a pixel begins, int64 (N,)."""
+        """Start of the window around each pixel in the padded image, int64 (N,)."""
         corner: NDArray[np.int64] = pixel + pixel // self._width * (2 * REACH)
         return corner

@@ -1,4 +1,4 @@
-"""Fits candidates to scans of which it is known what is rain."""
+"""Fits candidates to scans with known rain."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,7 +13,7 @@ from derain.views.candidates import Bound, Candidates, bounded_channels
 from derain.views.channels import channel_values
 from derain.views.morton import first_rows
 
-# Share of the rain that candidates hold, unless another is asked for.
+# Default share of the rain that candidates hold.
 RAIN_INSIDE = 0.999
 LEAST_INSIDE = 0.5
 
@@ -35,7 +35,7 @@ def fit_candidates(
     """Finds bounds that hold a stated share of the rain with a margin, and leave out what they can.
 
     Each side of each channel is allowed an equal part of the rain that may be left out, and the
-    bound found so is moved outwards by a margin that the rain's own tail says: as far again as
+    bound found so is moved outwards by a margin from the rain's own tail: as far again as
     from ten times that part to the part itself. Of a tail that falls exponentially, a tenth of the
     part is left out then, in scans alike. Where the part is less than one point of the rain, the
     bound starts from the outermost one, and the tail behind the ten outermost is followed further
@@ -89,10 +89,10 @@ class _Side:
 
     Attributes:
         channel: Name of the channel.
-        is_most: Whether it is that of large values.
+        is_most: True if it is that of large values.
         values: Those of all points, of the other side with their sign changed, float32 (M,); NaN
             where a point has none.
-        rain: Which points are rain, bool (M,).
+        rain: True for points of rain, bool (M,).
     """
 
     channel: str
@@ -101,7 +101,7 @@ class _Side:
     rain: NDArray[np.bool_]
 
     def limit(self, outside: float) -> float:
-        """What is above this is no rain; infinite where too little rain has a value to say.
+        """The limit above which nothing is rain; infinite if too little rain has a value.
 
         Args:
             outside: Share of the rain that may be above it, were there no margin.

@@ -1,4 +1,4 @@
-"""Candidates: the few bounds outside which no point is rain, so that nobody need look there."""
+"""Candidates: bounds outside which no point is rain, so that none is searched there."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
@@ -17,11 +17,11 @@ LARGEST_FLOAT32 = float(np.finfo(np.float32).max)
 
 @dataclass(frozen=True)
 class Bound:
-    """What a channel of rain is at least, and at most.
+    """Bounds of one channel: the least and the greatest value of rain.
 
     Attributes:
         channel: Its name, as :meth:`Scan.channel` takes it.
-        least: Smallest value of rain, in the channel's unit; None where there is no such bound.
+        least: Smallest value of rain, in the channel's unit; None without such a bound.
         most: Largest value of rain.
     """
 
@@ -30,7 +30,7 @@ class Bound:
     most: float | None = None
 
     def holds(self, values: NDArray[np.float32]) -> NDArray[np.bool_]:
-        """True for values within the bound, bool (N,); of what is not known, NaN, it says True."""
+        """True for values within the bound, bool (N,); also True for unknown values, NaN."""
         outside = np.zeros(len(values), bool)
         # Nothing is less or greater than NaN. A bound as float32 compares as fast as can be.
         if self.least is not None:
@@ -51,13 +51,13 @@ class Bound:
 
 @dataclass(frozen=True)
 class Candidates:
-    """Points that may be rain: those within all of some bounds. Whatever is outside is not rain.
+    """Points that may be rain: those within all bounds. All other points are not rain.
 
     Attributes:
-        bounds: The bounds, one a channel.
-        points: Share of the points that they were fitted to which are candidates.
-        rain: Share of the rain there which is.
-        rain_share: Share of rain among the candidates there.
+        bounds: The bounds, one per channel.
+        points: Share of candidates among the points that the bounds were fitted to.
+        rain: Share of candidates among the rain of these points.
+        rain_share: Share of rain among the candidates of these points.
     """
 
     bounds: tuple[Bound, ...]
@@ -66,15 +66,15 @@ class Candidates:
     rain_share: float = 0.0
 
     def among(self, scan: Scan) -> NDArray[np.bool_]:
-        """Which rows of a scan are candidates.
+        """True for rows of a scan that are candidates.
 
-        A channel that the scan has not got, or a value that it lacks, excludes no point.
+        A missing channel or value excludes no point.
 
         Args:
             scan: The scan, its intensities in the unit of the data that the bounds were fitted to.
 
         Returns:
-            bool (N,). Of rows that cannot be judged it says nothing.
+            bool (N,); undefined for rows that cannot be judged.
         """
         candidate = np.ones(len(scan), bool)
         for bound in self.bounds:
@@ -93,7 +93,7 @@ class Candidates:
 
 
 def narrower(some: Iterable[Bound], others: Iterable[Bound]) -> tuple[Bound, ...]:
-    """The bounds that hold what both hold, one a channel."""
+    """The intersection of both bounds, one bound per channel."""
     by_channel = {bound.channel: bound for bound in some}
     for other in others:
         bound = by_channel.get(other.channel, other)
@@ -110,7 +110,7 @@ def narrower(some: Iterable[Bound], others: Iterable[Bound]) -> tuple[Bound, ...
 
 
 def candidates_at(entry: Entry) -> Candidates | None:
-    """The candidates that stand in a document, which is not trusted; None where it has none.
+    """Reads candidates from an untrusted document; None if it has none.
 
     Raises:
         InputError: Something that does not describe them.
@@ -121,11 +121,10 @@ def candidates_at(entry: Entry) -> Candidates | None:
 
 
 def bounded_channels(channels: Sequence[str]) -> tuple[str, ...]:
-    """What candidates of a network may be bounded by: range, height, and what else it sees.
+    """Channels that may bound a network's candidates: range, height, and its other inputs.
 
-    A place to the left or right, or before or behind, tells nothing of rain but where it fell. And
-    what the network is blind to, such as the intensity of an unknown sensor, its candidates must
-    not depend on either.
+    x and y are left out: they only show where the training scans had rain. Channels that the
+    network does not see, such as the intensity of an unknown sensor, are left out too.
 
     Args:
         channels: Input channels of the network.
@@ -137,7 +136,7 @@ def _bounds(entry: Entry) -> tuple[Bound, ...]:
     bounds = tuple(_bound(item) for item in entry.items()[: MOST_CHANNELS + 1])
     channels = [bound.channel for bound in bounds]
     if len(set(channels)) < len(channels) or not 0 < len(channels) <= MOST_CHANNELS:
-        raise entry.fault("it bounds no channel, or one twice", "Write one bound a channel.")
+        raise entry.fault("it bounds no channel, or one twice", "Write one bound per channel.")
     return bounds
 
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from derain.scan import Scan
 
-# What networks see unless they are told otherwise. All other channels are extra: a scan need not
-# have them, and a data card has their statistics only where a network has asked for them.
+# The default channels of networks. All other channels are extra: a scan need not have them, and a
+# data card has their statistics only after a network has used them.
 USUAL_CHANNELS = ("x", "y", "z", "intensity", "range")
 
 # Far more than any sensor measures of a point.
@@ -42,7 +42,7 @@ def with_columns(scan: Scan, channels: Sequence[str]) -> Scan:
 def channel_values(
     scan: Scan, rows: NDArray[np.int64], channels: Sequence[str]
 ) -> NDArray[np.float32]:
-    """What some points of a scan measure.
+    """Values of a channel at some points of a scan.
 
     Args:
         scan: The scan.
@@ -66,13 +66,13 @@ def filled_values(
     channels: Sequence[str],
     fill_value: Mapping[str, float],
 ) -> NDArray[np.float32]:
-    """What some points of a scan measure, point by point, and a stand-in for what they lack.
+    """Values of channels at some points of a scan, with replacements for missing ones.
 
     Args:
         scan: The scan.
         rows: Row numbers of points that are valid, int64 (M,).
         channels: Names of C channels.
-        fill_value: What stands in for a value that is missing, by channel; 0 if not named.
+        fill_value: Replacement of a missing value, by channel; 0 if not named.
 
     Returns:
         float32 (M, C), each channel in its own unit; finite where the stand-ins are.
@@ -94,13 +94,13 @@ def channel_image(
     channels: Sequence[str],
     fill_value: Mapping[str, float],
 ) -> NDArray[np.float32]:
-    """What the points in the pixels of an image measure, and a stand-in for what they lack.
+    """Values of channels in the pixels of an image, with replacements for missing ones.
 
     Args:
         scan: The scan.
         winner: Row of the point in each pixel, one that is valid, int64 (M,); -1 in empty pixels.
         channels: Names of C channels.
-        fill_value: What stands in for a value that is missing, by channel; 0 if not named.
+        fill_value: Replacement of a missing value, by channel; 0 if not named.
 
     Returns:
         float32 (C, M), finite; 0 in empty pixels.

@@ -1,9 +1,9 @@
-"""Pixels of a spherical grid by look-up: no trigonometry, and exact wherever there is an answer.
+"""Pixels of a spherical grid by look-up, without trigonometry; every answer is exact.
 
-Two numbers say where a direction points, for one division each: its *height*, which ascends with
-the inclination, and its *turn*, which ascends with the azimuth. Each is cut into many more bins
-than a grid has rows or columns, and a table says of each bin in which row or column it lies. Bins
-with a border in them are unsure; so are those so near to one that rounding may mistake the bin.
+A direction has two coordinates, each computed with one division: its *height*, which ascends with
+the inclination, and its *turn*, which ascends with the azimuth. Both are divided into many more
+bins than a grid has rows or columns, and a table holds the row or column of each bin. Bins that
+contain a border are unsure, and so are bins so near to one that rounding may choose the wrong bin.
 """
 
 from collections.abc import Callable
@@ -20,19 +20,19 @@ BINS = 2**16
 # of their whole extent, which is 1/64 of a bin.
 BORDER_MARGIN = 1 / 16
 
-# What stands in a table besides numbers of pixels. Entries of both tables are added: the sum is
-# below UNSURE_BELOW where one is unsure, or else negative where one is outside the grid.
+# Entries of a table that are not pixels. Entries of both tables are added: the sum is below
+# UNSURE_BELOW if one is unsure; otherwise it is negative if one is outside the grid.
 OUTSIDE = -(2**24)
 UNSURE_BELOW = 2 * OUTSIDE
 UNSURE = 2 * UNSURE_BELOW
 
-# Squared ranges, in square metres, of points whose height float32 tells as precisely as that.
+# Squared ranges, in square metres, of points whose height float32 holds to that precision.
 SQUARED_RANGES = (1e-20, 1e20)
 
-# Points that are looked up at a time: what is computed on the way stays in the cache.
+# Points that are looked up at a time, so that intermediate results stay in the cache.
 POINTS_AT_A_TIME = 2**14
 
-# Says of some angles, float64 (M,), degrees, in which row or column of a grid they lie, int64 (M,).
+# Maps angles, float64 (M,), degrees, to rows or columns of a grid, int64 (M,).
 OfAngles = Callable[[NDArray[np.float64]], NDArray[np.int64]]
 
 
@@ -41,9 +41,9 @@ class DirectionTable:
 
     Args:
         inclinations: Borders between rows, and the grid's bounds, float64, degrees.
-        first_pixel: First pixel of an inclination's row; OUTSIDE where there is none.
+        first_pixel: First pixel of an inclination's row; OUTSIDE if there is none.
         azimuths: Borders between columns, and the grid's bounds, float64, degrees.
-        column: Column of an azimuth; OUTSIDE where there is none.
+        column: Column of an azimuth; OUTSIDE if there is none.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class DirectionTable:
 
         Returns:
             Pixels, int64 (N,); negative outside the grid, and less than UNSURE_BELOW where the
-            table does not know.
+            table is unsure.
         """
         pixel = np.empty(len(xyz), np.int64)
         for start in range(0, len(xyz), POINTS_AT_A_TIME):
@@ -77,13 +77,13 @@ class DirectionTable:
         return pixel
 
     def _look_up(self, xyz: NDArray[np.float32]) -> NDArray[np.int32]:
-        # What overflows on the way, or divides by zero, is unsure in the end.
+        # An overflow or a division by zero ends up unsure.
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
             x, y, z = np.ascontiguousarray(xyz.T, dtype=np.float32)
             squared = x * x + y * y + z * z
             height = height_of(z, np.sqrt(squared)).astype(np.int64)
             turn = turn_of(x, y).astype(np.int64)
-        # Clipping bounds what is not a number; all else is within.
+        # Clipping bounds NaN; all other values are within.
         pixel = self._first_pixels.take(height, mode="clip") + self._columns.take(turn, mode="clip")
         least, most = SQUARED_RANGES
         pixel[~((squared > least) & (squared < most))] = UNSURE
@@ -91,7 +91,7 @@ class DirectionTable:
 
 
 def _table(of_bins: NDArray[np.int64], borders: NDArray[np.float64]) -> NDArray[np.int32]:
-    """What each bin holds, int32 (BINS + 1,): the last is for what is BINS itself."""
+    """The entry of each bin, int32 (BINS + 1,): the last is for the value BINS itself."""
     table = np.append(of_bins, UNSURE).astype(np.int32)
     for near in (borders - BORDER_MARGIN, borders + BORDER_MARGIN):
         table[np.clip(near, 0, BINS).astype(np.int64)] = UNSURE
@@ -112,17 +112,17 @@ def _inclination(height: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def turn_of(x: NDArray[Any], y: NDArray[Any]) -> NDArray[Any]:
-    """The way from straight behind, counter-clockwise, in bins from 0 to BINS.
+    """The distance from straight behind, counter-clockwise, in bins from 0 to BINS.
 
-    It is measured along the square |x| + |y| = 1, each side of which is as good as an arc.
+    It is measured along the square |x| + |y| = 1, each of whose sides replaces an arc.
     """
-    way: NDArray[Any] = 2 + np.copysign(1 - x / (np.abs(x) + np.abs(y)), y)
-    return way * (BINS // 4)
+    distance: NDArray[Any] = 2 + np.copysign(1 - x / (np.abs(x) + np.abs(y)), y)
+    return distance * (BINS // 4)
 
 
 def _azimuth(turn: NDArray[Any]) -> NDArray[np.float64]:
     """Azimuth of a turn, degrees."""
-    way = turn / (BINS // 4) - 2
-    x = 1 - np.abs(way)
-    azimuth: NDArray[np.float64] = np.degrees(np.arctan2(np.copysign(1 - np.abs(x), way), x))
+    distance = turn / (BINS // 4) - 2
+    x = 1 - np.abs(distance)
+    azimuth: NDArray[np.float64] = np.degrees(np.arctan2(np.copysign(1 - np.abs(x), distance), x))
     return azimuth

@@ -1,4 +1,4 @@
-"""Where a sensor saw returns, which of them in one direction, and whether that is chance.
+"""Directions of returns: which returns share a direction, and whether that is chance.
 
 A sensor of two returns gives both the direction of their ray, to the last digits of the numbers.
 Between these and the neighbouring rays nothing lies: where directions agree by chance, as those of
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 # one ray stand out, which is where neighbouring rays are out of reach.
 TOLERANCES = (0.05, 0.02, 0.01, 0.005, 0.002, 0.001)
 
-# More returns in one direction are not of one ray: sensors tell up to three apart.
+# More returns in one direction are not of one ray: sensors distinguish up to three.
 MOST_RETURNS = 3
 
 # Directions agree by chance in the nearer half of a tolerance at most as often as in the farther.
@@ -39,7 +39,7 @@ def directions(xyz: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[n
         count as positive: straight behind is 180, and above and below the sensor, where every
         azimuth would do, it is 0.
     """
-    # Adding 0 makes zeros positive: arctan2 tells -0.0 from 0.0.
+    # Adding 0 makes zeros positive: arctan2 distinguishes -0.0 from 0.0.
     x, y, z = np.ascontiguousarray(xyz.T, dtype=np.float64) + 0.0
     azimuth = np.degrees(np.arctan2(y, x))
     inclination = np.degrees(np.arctan2(z, np.sqrt(x * x + y * y)))
@@ -52,7 +52,7 @@ def shared_direction_pairs(xyz: NDArray[np.float32], evident: bool = True) -> ND
     Args:
         xyz: Finite and distinct positions other than the origin, float32 (M, 3), metres in the
             sensor frame.
-        evident: Whether pairs are none where so many could have come about by chance. Otherwise,
+        evident: True if pairs are none where so many could have come about by chance. Otherwise,
             such are those within the second smallest of TOLERANCES.
 
     Returns:

@@ -1,4 +1,4 @@
-"""The full scale of intensities, which tells their unit."""
+"""The full scale of intensities, which shows their unit."""
 
 from collections.abc import Sequence
 
@@ -6,12 +6,12 @@ import numpy as np
 
 from derain.scan import Scan
 
-# Full scales that files of intensities have: a share, one byte, two bytes.
+# Usual full scales of intensities in files: a share, one byte, two bytes.
 FULL_SCALES = (1.0, 255.0, 65_535.0)
 
 
 def full_scale(scans: Sequence[Scan]) -> float:
-    """Full scale of the scans' intensities, in their unit; not a number where none has any.
+    """Full scale of the scans' intensities, in their unit; NaN if no scan has intensities.
 
     It is the smallest of FULL_SCALES that no intensity exceeds.
 

@@ -28,10 +28,10 @@ ROW_MULTIPLE = 16
 COLUMN_MULTIPLE = 64
 
 # Even rows come to about this many pixels a return at most. It bounds the rows of clouds that no
-# beams made; of scans whose beams cannot be told, the tests' worst comes to 5.
+# beams made; for scans whose beams cannot be found, the tests' worst is 5.
 PIXELS_PER_RETURN = 8
 
-# As many scans tell the sensor's beams and steps; all of them tell its field of view.
+# Number of scans for the sensor's beams and steps; its field of view is found from all scans.
 SCANS = 4
 
 
@@ -42,7 +42,7 @@ class GridFit:
     Attributes:
         grid: The grid.
         beams: Inclinations of the sensor's beams from top to bottom, degrees, one a row of the
-            grid; empty where the beams cannot be told and the rows are even.
+            grid; empty if the beams cannot be found and the rows are even.
         points: Valid points of all scans.
         hidden: Share of them whose pixel shows a nearer return.
         outside: Share of them outside the grid.
@@ -64,7 +64,7 @@ class GridFit:
             "columns": self.grid.columns,
             "azimuth": [round(bound, 3) for bound in self.grid.azimuth],
             "inclination": [round(bound, 3) for bound in (edges[-1], edges[0])],
-            "beams": len(self.beams) or "not told apart",
+            "beams": len(self.beams) or "not found",
             "points": self.points,
             "points hidden by nearer ones": round(self.hidden, 4),
             "points outside": round(self.outside, 4),

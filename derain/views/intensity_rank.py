@@ -1,4 +1,4 @@
-"""How bright points are among those of their scan: the same in whatever unit intensities are."""
+"""Ranks of intensities within their scan, which do not depend on the unit of intensity."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ def intensity_rank(scan: Scan) -> NDArray[np.int64]:
     """Ranks of the points of a scan by their intensity.
 
     Every intensity that occurs counts by the root of how often it does: where most of the points
-    share one, such as 0, the others are still told apart.
+    share one, such as 0, the others still differ.
 
     Args:
         scan: The scan.
@@ -34,7 +34,7 @@ def intensity_rank(scan: Scan) -> NDArray[np.int64]:
 
 
 def edges_reached(values: NDArray[np.float32], edges: NDArray[np.float32]) -> NDArray[np.int64]:
-    """How many edges are no greater than each value.
+    """Number of edges that are no greater than each value.
 
     Args:
         values: float32 (N,).

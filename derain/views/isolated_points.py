@@ -110,7 +110,7 @@ class IsolatedPoints(ViewedScan):
         return {name: getattr(self, name) for name in names}
 
     def target(self, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """What the network is to say of each isolated point.
+        """Training target of each isolated point.
 
         Args:
             rain: Truth for every row of the scan, bool (N,).
@@ -121,7 +121,7 @@ class IsolatedPoints(ViewedScan):
         return rain[self.first[self._isolated]].astype(np.int64)
 
     def back_projection(self) -> BackProjection:
-        """What gives every row the score of its point, and 0 where that is crowded."""
+        """Back-projection: gives every row the score of its point, and 0 if that is crowded."""
         return partial(of_points_to_rows, self.inverse, self._isolated, len(self.points))
 
     @staticmethod
@@ -142,7 +142,7 @@ class IsolatedPoints(ViewedScan):
 @VIEWS.add("isolated_points")
 @dataclass(frozen=True)
 class IsolatedPointView(View):
-    """How a scan becomes its isolated points; the same in training and in deployment.
+    """Converts a scan into its isolated points; the same in training and in deployment.
 
     Args:
         neighbours: k, the size of a neighbourhood, the point itself included.
@@ -177,7 +177,7 @@ class IsolatedPointView(View):
 
     @property
     def azimuth(self) -> tuple[float, float]:
-        """What it sees: everything around."""
+        """Its field of view: everything around."""
         return ALL_AROUND
 
     def __call__(self, scan: Scan) -> IsolatedPoints:
@@ -221,7 +221,7 @@ class IsolatedPointView(View):
     def _searched(
         self, xyz: NDArray[np.float32], first: NDArray[np.int64]
     ) -> tuple[NeighbourSearch, float, bool]:
-        """What finds neighbours, the step, and whether some returns are written more than once.
+        """The neighbour search, the step, and whether some returns are written more than once.
 
         The latter two are those of a sample: where none of thousands is written twice, the few that
         may be make no difference.
@@ -279,7 +279,7 @@ def _directions(xyz: NDArray[np.float32]) -> NDArray[np.float64]:
 
 
 def crowding(xyz: NDArray[np.float32], step: float) -> NDArray[np.float32]:
-    """How many others are near each point, each counting the less the farther it is.
+    """Number of others near each point, weighted less the farther they are.
 
     Only what lies near it along the curve is looked at, so that nothing is searched for: a crowded
     point is crowded for sure, and one that seems to be alone may not be.

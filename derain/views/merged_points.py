@@ -1,8 +1,8 @@
 """Points that are one return, written more than once: on one ray, as good as equally far.
 
 Sensors with two returns, deskewed scans and merged files write most points nearly twice, fractions
-of a millimetre to centimetres apart. Such copies say nothing about a neighbourhood, as those at
-exactly one position say nothing.
+of a millimetre to centimetres apart. Such copies hold no information about a neighbourhood, as
+those at exactly one position hold none.
 """
 
 import numpy as np
@@ -30,7 +30,7 @@ def merged_points(
         xyz: Distinct positions in the sensor's frame, float32 (M, 3), metres.
         rows: Their rows in the scan, int64 (M,).
         neighbours: Of each point itself and its nearest neighbours, int64 (M, k).
-        distances: How far those are, float32 (M, k), metres.
+        distances: Their distances, float32 (M, k), metres.
 
     Returns:
         Of each return the point of the lowest row, int64 (R,), in the order of the points; and the
@@ -59,13 +59,13 @@ def are_one_return(
     neighbours: NDArray[np.int64],
     distances: NDArray[np.float32],
 ) -> NDArray[np.bool_]:
-    """Which neighbours of some points are one return with them.
+    """True for neighbours of some points that are one return with them.
 
     Args:
         xyz: Distinct positions in the sensor's frame, float32 (M, 3), metres.
         points: Rows of Q of them, int64 (Q,).
         neighbours: Of each of these itself and its nearest neighbours, int64 (Q, k).
-        distances: How far those are, float32 (Q, k), metres.
+        distances: Their distances, float32 (Q, k), metres.
 
     Returns:
         bool (Q, k - 1), of the neighbours.

@@ -86,7 +86,7 @@ def distinct_positions(xyz: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDA
 def _differ(
     xyz: NDArray[np.float32], order: NDArray[np.int64], places: NDArray[np.int64]
 ) -> NDArray[np.bool_]:
-    """Whether points at some places of an order are elsewhere than those before them, bool (Q,)."""
+    """True if points at some places of an order are elsewhere than those before them, bool (Q,)."""
     own = xyz.take(order[places], axis=0)
     before = xyz.take(order[places - 1], axis=0)
     x, y, z = (own != before).T
@@ -95,7 +95,7 @@ def _differ(
 
 
 def _ascending(code: NDArray[np.uint64]) -> NDArray[np.int64]:
-    """What sorts cell numbers, equal ones in their order; of int64 (N,)."""
+    """The permutation that sorts cell numbers, int64 (N,); equal ones keep their order."""
     # NumPy sorts 16 bits by radix, which thrice is twice as fast as sorting 48 by comparison.
     order = np.argsort(code.astype(np.uint16), kind="stable")
     for shift in (16, 32):

@@ -51,11 +51,11 @@ class NeighbourSearch:
         Returns:
             Rows of ``xyz``, int64 (Q, k), and distances in metres, float32 (Q, k).
         """
-        asked = len(self._xyz) if queries is None else len(queries)
-        if not asked:
+        count = len(self._xyz) if queries is None else len(queries)
+        if not count:
             return np.zeros((0, k), np.int64), np.zeros((0, k), np.float32)
         found = min(k, len(self._xyz))
-        # One more than asked for shows whether the last neighbour has an equal just behind it.
+        # One more than needed shows whether the last neighbour has an equal just behind it.
         rows, squared = self.nearest(queries, min(k + 1, len(self._xyz)))
         tied = _rows_with_equals(squared)
         if len(tied):

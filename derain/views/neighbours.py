@@ -17,7 +17,7 @@ from derain.views.neighbour_search import NeighbourSearch
 from derain.views.spherical_grid import ALL_AROUND
 from derain.views.view import VIEWS, BackProjection, View, ViewedScan
 
-# The most that the Spec of a network may ask for, seven times as many as 3D-OutDet looks at. A
+# The most neighbours that a Spec may state, seven times as many as those of 3D-OutDet. A
 # hundred thousand points have 80 MB of them.
 MOST_NETWORK_NEIGHBOURS = 64
 
@@ -85,7 +85,7 @@ class Neighbourhoods(ViewedScan):
         return inputs
 
     def target(self, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """What the network is to say of each point that it scores.
+        """Training target of each point that it scores.
 
         Args:
             rain: Truth for every row of the scan, bool (N,).
@@ -97,7 +97,7 @@ class Neighbourhoods(ViewedScan):
         return rain[first].astype(np.int64)
 
     def back_projection(self) -> BackProjection:
-        """What gives every row the score of its point, and 0 where that has none."""
+        """Back-projection: gives every row the score of its point, and 0 if that has none."""
         if self.candidates is None:
             return partial(_to_rows, self.inverse)
         return partial(of_points_to_rows, self.inverse, self._of_candidates, len(self.points))
@@ -133,14 +133,14 @@ class Neighbourhoods(ViewedScan):
 @VIEWS.add("neighbours")
 @dataclass(frozen=True)
 class NeighbourView(View):
-    """How a scan becomes neighbourhoods; the same in training and in deployment.
+    """Converts a scan into neighbourhoods; the same in training and in deployment.
 
     Args:
         neighbours: k, the size of a neighbourhood, the point itself included.
-        channels: What the network sees of a point, in order, as :meth:`Scan.channel` names it.
-        fill_value: What stands in for a value that a scan lacks, by channel; 0 if not named.
+        channels: The network's input channels, in order, as :meth:`Scan.channel` names it.
+        fill_value: Replacement of a value that a scan lacks, by channel; 0 if not named.
         threads: Threads of the search; 0 takes every core this process may use.
-        candidates: Which points are scored; None for all.
+        candidates: Points that are scored; None for all.
     """
 
     neighbours: int = 9
@@ -170,7 +170,7 @@ class NeighbourView(View):
 
     @property
     def azimuth(self) -> tuple[float, float]:
-        """What it sees: everything around."""
+        """Its field of view: everything around."""
         return ALL_AROUND
 
     def with_candidates(self, candidates: Candidates) -> Self:
@@ -197,7 +197,7 @@ def _around(
 
     Args:
         search: Finds neighbours among M points.
-        candidate: Which of them are candidates, bool (M,).
+        candidate: True for candidates, bool (M,).
         k: Size of a neighbourhood.
 
     Returns:

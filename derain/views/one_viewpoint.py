@@ -1,9 +1,9 @@
-"""Whether points are what one LiDAR sees from where it stands, in metres.
+"""Checks that points are the view of one LiDAR from one place, in metres.
 
-Whatever derains a scan takes that for granted: neighbours are judged by distances in metres, and by
-how far apart rays of one sensor are at that range. Each check is told by a share of the points far
-beyond what any scan of a single sensor has, so that none is told of in vain.
-Units show in how far off points are, and in how far the ground is below the sensor: the feet of a
+All methods assume this: neighbours are judged by distances in metres, and by the distance between
+rays of one sensor at that range. Each check fails only at a share of points far beyond that of any
+scan of a single sensor, so that there are no false warnings.
+Units show in the ranges of points, and in the depth of the ground below the sensor: the feet of a
 sensor that sees no ground, or is less than 1.3 m above it, pass for metres.
 """
 
@@ -18,11 +18,11 @@ from derain.views.scan_issues import ScanIssue
 # Azimuth, inclination and range of points, float64 (3, M).
 Rays = NDArray[np.float64]
 
-# Fewer points than these, or a smaller share of the rows, and a scan says next to nothing.
+# A scan with fewer points, or a smaller share of valid rows, is too small to check.
 FEWEST_RETURNS = 50
 LEAST_VALID = 0.01
 
-# Positions and units are told from so many points, spread over all.
+# Number of points, spread over all, for the checks of positions and units.
 SAMPLED = 1024
 
 # Points lie this many times farther off than from one another: the sensor is not at the origin. A
@@ -85,44 +85,44 @@ FEWEST_ARMS = 4
 
 
 def viewpoint_issues(scan: Scan) -> Iterator[ScanIssue]:
-    """Says where a scan is not what one sensor sees from where it stands, in metres.
+    """Returns the signs that a scan is not the view of one sensor from one place, in metres.
 
-    Of a scan that is too far off or too small nothing else can be said.
+    A scan that is too far off or too small is not checked further.
 
     Args:
         scan: The scan.
     """
     rows = np.flatnonzero(scan.valid)
     if len(rows) < LEAST_VALID * len(scan) or len(rows) < FEWEST_RETURNS:
-        yield from _beyond_all_sensors(scan)
+        yield from _map_issue(scan)
         if len(rows):
             yield ScanIssue(
                 "almost empty",
                 f"{len(rows):,} of {len(scan):,} rows are points that can be judged: too few to "
-                "say anything of (is the sensor covered, or the file cut short?)",
+                "check the scan (is the sensor covered, or the file cut short?)",
             )
         return
     sample = scan.xyz.take(rows[:: -(-len(rows) // SAMPLED)], axis=0).astype(np.float64)
-    misplaced = [*_elsewhere(sample)] or [*_in_other_units(sample)]
+    misplaced = [*_off_centre_issue(sample)] or [*_unit_issue(sample)]
     yield from misplaced
     if not misplaced:
-        yield from [*_of_one_beam(sample)] or _of_many_viewpoints(scan)
+        yield from [*_single_beam_issue(sample)] or _viewpoints_issue(scan)
 
 
-def _beyond_all_sensors(scan: Scan) -> Iterator[ScanIssue]:
-    """Whether most of the rows are points, and too far off for any unit: those of a map."""
+def _map_issue(scan: Scan) -> Iterator[ScanIssue]:
+    """Yields an issue if most of the rows are points too far off for any unit: those of a map."""
     finite = np.isfinite(scan.xyz).all(axis=1)
     beyond = (np.abs(scan.xyz[finite]) > LARGEST_COORDINATE).any(axis=1)
     if 2 * beyond.sum() > len(scan):
         yield ScanIssue(
             "coordinates of a map",
             f"{beyond.sum():,} points are more than {LARGEST_COORDINATE:,.0f} m away and cannot be "
-            "judged: subtract where the sensor was, as from coordinates of a map (UTM)",
+            "judged: subtract the sensor's position, as from coordinates of a map (UTM)",
         )
 
 
-def _elsewhere(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
-    """Whether points, float64 (M, 3), lie together, far from the origin."""
+def _off_centre_issue(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
+    """Yields an issue if points, float64 (M, 3), lie together, far from the origin."""
     centre = np.median(sample, axis=0)
     around = float(np.median(np.linalg.norm(sample - centre, axis=1)))
     away = float(np.linalg.norm(centre))
@@ -130,13 +130,13 @@ def _elsewhere(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
         yield ScanIssue(
             "coordinates of a map",
             f"the points lie about {away:,.0f} m from the origin, and half of them within "
-            f"{around:,.0f} m of one another: subtract where the sensor was, as from coordinates "
-            "of a map (UTM), for they have to be as seen from the sensor",
+            f"{around:,.0f} m of one another: subtract the sensor's position, as from coordinates "
+            "of a map (UTM), because the sensor has to be the origin",
         )
 
 
-def _in_other_units(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
-    """Whether points, float64 (M, 3), are farther off or nearer than sensors see in metres."""
+def _unit_issue(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
+    """Yields an issue if points, float64 (M, 3), are farther off or nearer than in metres."""
     range_ = np.linalg.norm(sample, axis=1)
     far, near = np.percentile(range_, [FAR_PERCENTILE, 99])
     height = _height(sample)
@@ -167,7 +167,7 @@ def _in_other_units(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
 
 
 def _height(sample: NDArray[np.float64]) -> float:
-    """How far below the sensor the ground of points, float64 (M, 3), is, metres; NaN if unseen."""
+    """Depth of the ground below the sensor, metres; points are float64 (M, 3). NaN if unseen."""
     x, y, z = sample.T
     below = z[z < np.tan(np.radians(BELOW_HORIZON)) * np.hypot(x, y)]
     if len(below) < FEWEST_OF_GROUND:
@@ -175,8 +175,8 @@ def _height(sample: NDArray[np.float64]) -> float:
     return -float(np.percentile(below, GROUND_PERCENTILE))
 
 
-def _of_one_beam(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
-    """Whether points, float64 (M, 3), are all of one plane or cone of rays."""
+def _single_beam_issue(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
+    """Yields an issue if points, float64 (M, 3), are all of one plane or cone of rays."""
     rays = sample / np.linalg.norm(sample, axis=1, keepdims=True)
     lowest, highest = np.degrees(np.arcsin(np.percentile(rays[:, 2], [1, 99]).clip(-1, 1)))
     # Not a product of matrices, whose threads would take longer to wake than it takes.
@@ -185,13 +185,13 @@ def _of_one_beam(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
     if least < OUT_OF_PLANE**2 or highest - lowest < OPENING:
         yield ScanIssue(
             "a single beam",
-            "all points are of one beam, as those of a scanner of a plane are: models and filters "
-            "were made for sensors of many beams, and may take what stays",
+            "all points are of one beam, as those of a planar scanner: models and filters are made "
+            "for sensors of many beams, and may remove solid points",
         )
 
 
-def _of_many_viewpoints(scan: Scan) -> Iterator[ScanIssue]:
-    """Whether points are denser, or surfaces more often torn, than one sensor would see them."""
+def _viewpoints_issue(scan: Scan) -> Iterator[ScanIssue]:
+    """Yields an issue if points are denser, or surfaces more often torn, than in one scan."""
     rays = rays_near_axes(scan)
     crowding, step = crowding_far_off(rays), range_step(rays)
     if crowding > MORE_CROWDED:
@@ -223,7 +223,7 @@ def rays_near_axes(scan: Scan) -> Rays:
 
 
 def crowding_far_off(rays: Rays) -> float:
-    """How much closer, in angle, points lie together at some range than the nearest ones do.
+    """Density of points in angle at some range, relative to that of the nearest ones.
 
     Args:
         rays: Azimuth, inclination and range of points, as :func:`rays_near_axes` gives them; those
@@ -249,7 +249,7 @@ def crowding_far_off(rays: Rays) -> float:
 
 
 def range_step(rays: Rays) -> float:
-    """How much the range changes from one ray of a beam to the next: the median, as a ratio less 1.
+    """Change of range from one ray of a beam to the next: the median, as a ratio less 1.
 
     Args:
         rays: Azimuth, inclination and range of points, as :func:`rays_near_axes` gives them; of
@@ -272,7 +272,7 @@ def range_step(rays: Rays) -> float:
 
 
 def _near_axes(scan: Scan) -> NDArray[np.bool_]:
-    """Which points are near the x and y axes and the diagonals between them, bool (N,)."""
+    """True for points that are near the x and y axes and the diagonals between them, bool (N,)."""
     near = np.zeros(len(scan), bool)
     x, y = np.ascontiguousarray(scan.xyz[:, :2].T)
     with np.errstate(invalid="ignore"):

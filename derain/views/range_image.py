@@ -74,7 +74,7 @@ class RangeImage(ViewedScan):
         return {"image": self.image[None], "valid": self.valid[None, None]}
 
     def target(self, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """What the network is to say of each pixel.
+        """Training target of each pixel.
 
         Args:
             rain: Truth for every row of the scan, bool (N,).
@@ -89,10 +89,10 @@ class RangeImage(ViewedScan):
         return result
 
     def back_projection(self) -> BackProjection:
-        """What gives points scores of pixels as ``back_projection_name`` says.
+        """Back-projection of pixel scores to points, by ``back_projection_name``.
 
         Rows off the grid, and rows that are no candidates, have 0; a pixel that shows what is no
-        candidate counts as scored 0, whatever the network says of it.
+        candidate counts as scored 0, for any score of the network.
         """
         if self.candidate is None:
             rows, asked = np.flatnonzero(self.judged), None
@@ -136,18 +136,18 @@ def _to_rows(
 @VIEWS.add("range")
 @dataclass(frozen=True)
 class RangeView(View):
-    """How a scan becomes a range image; the same in training and in deployment.
+    """Converts a scan into a range image; the same in training and in deployment.
 
     The nearest return wins a pixel; of equally near ones that of the lowest row.
 
     Args:
         grid: Rows and columns of the image.
-        channels: What a pixel holds, in order, as :meth:`Scan.channel` names it.
+        channels: Channels of a pixel, in order, as :meth:`Scan.channel` names it.
         back_projection: Name of the back-projection, by which points that lost their pixel get a
             score: ``nearest range``, ``copy`` or ``vote``. A Spec has it under the key
                 ``back_projection``.
-        fill_value: What stands in for a value that a scan lacks, by channel; 0 if not named.
-        candidates: Which points are scored; None for all. The image shows the others all the same.
+        fill_value: Replacement of a value that a scan lacks, by channel; 0 if not named.
+        candidates: Points that are scored; None for all. The image shows the others all the same.
 
     Raises:
         InputError: An unknown back-projection.
@@ -164,7 +164,7 @@ class RangeView(View):
             raise InputError(
                 "back_projection",
                 f"no such back-projection: '{self.back_projection}'",
-                f"Known are {', '.join(BACK_PROJECTIONS)}.",
+                f"Available: {', '.join(BACK_PROJECTIONS)}.",
             )
 
     @classmethod
@@ -173,7 +173,7 @@ class RangeView(View):
     ) -> Self:
         """The view that a Spec describes by its ``kind``, ``grid`` and ``way_back``.
 
-        It takes one thread, whatever it may use.
+        It uses one thread, even if more are permitted.
 
         Raises:
             InputError: Something that does not describe it.
@@ -190,7 +190,7 @@ class RangeView(View):
 
     @property
     def azimuth(self) -> tuple[float, float]:
-        """What it sees: the grid's right and left bound, degrees counter-clockwise from x."""
+        """Its field of view: the grid's right and left bound, degrees counter-clockwise from x."""
         return self.grid.azimuth
 
     def with_candidates(self, candidates: Candidates) -> Self:
@@ -227,7 +227,7 @@ class RangeView(View):
 
 
 def _shown(pixel: NDArray[np.int64], distance: NDArray[np.float32], size: int) -> NDArray[np.void]:
-    """What each pixel shows: the nearest point, the lowest row of equally near ones.
+    """The point in each pixel: the nearest one, the lowest row of equally near ones.
 
     Args:
         pixel: Pixel of each point, int64 (N,); -1 for those in none.

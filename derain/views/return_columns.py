@@ -1,4 +1,4 @@
-"""What a file's own columns say of returns: which is the first of its ray, and which follow."""
+"""Returns by a file's own columns: which is the first of its ray, and which follow."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,12 +13,12 @@ from derain.scan import LARGEST_COORDINATE, Scan
 # Source: tier4/nebula, `dual_return_distance_threshold`.
 LEAST_APART = 0.1
 
-# What drivers call the number of a return within its ray, and how many the ray has.
+# Drivers' names for the number of a return within its ray, and for the number of its returns.
 NUMBER_NAMES = ("return_number", "return_id", "return_index", "echo")
 COUNT_NAMES = ("number_of_returns", "return_count", "num_returns")
 
 # Types of returns in dual mode, those in front and those behind: first or last of the two, each
-# either the weaker or the stronger one. Two numberings are about, which these pairs tell apart.
+# either the weaker or the stronger one. There are two numberings, which these pairs distinguish.
 # Source: tier4/nebula, `ReturnType`; autowarefoundation/autoware.universe, `ReturnType`.
 NEBULA = ((4, 9), (5, 10))
 NEBULA_TELLS = frozenset({9, 10})
@@ -28,16 +28,16 @@ AUTOWARE_LARGEST = 7
 
 @dataclass(frozen=True, eq=False)
 class StatedReturns:
-    """What one or two columns say of the returns of a scan.
+    """The returns of a scan by one or two of its columns.
 
     Attributes:
         column: Name of the column.
-        number: The same for returns that are not of one ray together; of two returns of one ray,
-            each has its own, int64 (N,); -1 for the only return of a ray.
-        nearer: Where it says that a return of the same ray lies behind, bool (N,).
-        farther: Where it says that a return of the same ray lies in front, bool (N,).
-        other_range: Range of the other return, where that is no row of its own, float32 (N,),
-            metres; NaN where it is one or there is none.
+        number: Number of the return within its ray, int64 (N,); two returns of one ray have
+            different numbers. -1 for the only return of a ray.
+        nearer: True if a return of the same ray lies behind by the column, bool (N,).
+        farther: True if a return of the same ray lies in front by the column, bool (N,).
+        other_range: Range of the other return if that has no row of its own, float32 (N,),
+            metres; NaN if it has one or there is none.
     """
 
     column: str
@@ -48,19 +48,19 @@ class StatedReturns:
 
 
 def stated_returns(scan: Scan) -> StatedReturns | None:
-    """What a scan's columns say of its returns.
+    """Reads the returns of a scan from its columns.
 
-    A column by which no ray has two says nothing: writers fill in 1 where they do not know.
+    A column by which no ray has two returns is ignored: writers fill in 1 for unknown values.
 
     Args:
-        scan: The scan. Known are ``return_number`` (or ``return_id``, ``return_index``, ``echo``)
-            with or without ``number_of_returns``, counted from the sensor outwards; ``bit_fields``,
-            in which LAS has both; ``return_type`` of Nebula and Autoware; bits 4 and 5 of Livox's
-            ``tag``; and ``range2`` beside ``range``, by which Ouster states a second return in the
-            row of the first.
+        scan: The scan. Supported columns: ``return_number`` (or ``return_id``, ``return_index``,
+            ``echo``) with or without ``number_of_returns``, counted from the sensor outwards;
+            ``bit_fields``, in which LAS has both; ``return_type`` of Nebula and Autoware; bits 4
+            and 5 of Livox's ``tag``; and ``range2`` beside ``range``, by which Ouster states a
+            second return in the row of the first.
 
     Returns:
-        None where no column tells.
+        None if no column holds returns.
     """
     columns = {
         name.lower(): column
@@ -73,18 +73,18 @@ def stated_returns(scan: Scan) -> StatedReturns | None:
 Columns = Mapping[str, NDArray[Any]]
 
 
-def _of_numbers(scan: Scan, columns: Columns) -> StatedReturns | None:
+def _from_numbers(scan: Scan, columns: Columns) -> StatedReturns | None:
     name = next((name for name in NUMBER_NAMES if name in columns), None)
     if name is None:
         return None
     number = _whole(columns[name])
     count = next((_whole(columns[title]) for title in COUNT_NAMES if title in columns), None)
     if count is None:
-        return _counted(scan, name, number)
-    return _of_so_many(scan, name, number, count)
+        return _from_numbers_alone(scan, name, number)
+    return _from_numbers_and_counts(scan, name, number, count)
 
 
-def _of_las_bits(scan: Scan, columns: Columns) -> StatedReturns | None:
+def _from_las_bits(scan: Scan, columns: Columns) -> StatedReturns | None:
     bits = columns.get("bit_fields")
     if bits is None or bits.dtype != np.uint8:
         return None
@@ -93,13 +93,15 @@ def _of_las_bits(scan: Scan, columns: Columns) -> StatedReturns | None:
     width = 4 if "classification_flags" in columns else 3
     ones = (1 << width) - 1
     number, count = bits & ones, bits >> width & ones
-    return _of_so_many(scan, "bit_fields", number.astype(np.int64), count.astype(np.int64))
+    return _from_numbers_and_counts(
+        scan, "bit_fields", number.astype(np.int64), count.astype(np.int64)
+    )
 
 
-def _of_so_many(
+def _from_numbers_and_counts(
     scan: Scan, name: str, number: NDArray[np.int64], count: NDArray[np.int64]
 ) -> StatedReturns | None:
-    """What numbers from 1 say where the number of returns of each ray is known."""
+    """Returns by numbers from 1, if the number of returns of each ray is known."""
     several = scan.valid & (count > 1) & (number >= 1) & (number <= count)
     if not several.any():
         return None
@@ -108,11 +110,11 @@ def _of_so_many(
         np.where(several, number, -1),
         several & (number < count),
         several & (number > 1),
-        _nowhere(scan),
+        _no_range(scan),
     )
 
 
-def _of_types(scan: Scan, columns: Columns) -> StatedReturns | None:
+def _from_types(scan: Scan, columns: Columns) -> StatedReturns | None:
     if "return_type" not in columns:
         return None
     kind = _whole(columns["return_type"])
@@ -125,16 +127,16 @@ def _of_types(scan: Scan, columns: Columns) -> StatedReturns | None:
         return None
     nearer, farther = scan.valid & np.isin(kind, front), scan.valid & np.isin(kind, behind)
     number = np.where(nearer, 1, np.where(farther, 2, -1))
-    return StatedReturns("return_type", number, nearer, farther, _nowhere(scan))
+    return StatedReturns("return_type", number, nearer, farther, _no_range(scan))
 
 
-def _of_tags(scan: Scan, columns: Columns) -> StatedReturns | None:
+def _from_tags(scan: Scan, columns: Columns) -> StatedReturns | None:
     if "tag" not in columns or columns["tag"].dtype.kind not in "iu":
         return None
-    return _counted(scan, "tag", _whole(columns["tag"]) >> 4 & 3)
+    return _from_numbers_alone(scan, "tag", _whole(columns["tag"]) >> 4 & 3)
 
 
-def _of_second_ranges(scan: Scan, columns: Columns) -> StatedReturns | None:
+def _from_second_ranges(scan: Scan, columns: Columns) -> StatedReturns | None:
     if not {"range", "range2"} <= columns.keys():
         return None
     first, second = (columns[name].astype(np.float64) for name in ("range", "range2"))
@@ -152,33 +154,33 @@ def _of_second_ranges(scan: Scan, columns: Columns) -> StatedReturns | None:
     return StatedReturns("range2", np.full(len(scan), -1), nearer, farther, other_range)
 
 
-def _counted(scan: Scan, name: str, number: NDArray[np.int64]) -> StatedReturns | None:
-    """What numbers from 0 or from 1 say where nobody says how many returns a ray has.
+def _from_numbers_alone(scan: Scan, name: str, number: NDArray[np.int64]) -> StatedReturns | None:
+    """Returns by numbers from 0 or 1, if the number of returns of each ray is not known.
 
-    The first return may be the only one of its ray: whether it is, its direction has to tell.
+    The first return may be the only one of its ray; directions have to decide that.
     """
     numbers = number[scan.valid]
     if not len(numbers) or numbers.min() == numbers.max():
         return None
     farther = scan.valid & (number > numbers.min())
-    return StatedReturns(name, number, np.zeros(len(scan), bool), farther, _nowhere(scan))
+    return StatedReturns(name, number, np.zeros(len(scan), bool), farther, _no_range(scan))
 
 
 def _whole(column: NDArray[Any]) -> NDArray[np.int64]:
-    """A column as whole numbers; what is none is -1."""
+    """A column as whole numbers; values that are not finite or too large are -1."""
     if column.dtype.kind != "f":
         return column.astype(np.int64)
     return np.where(np.abs(column) < 2**31, column, -1).astype(np.int64)
 
 
-def _nowhere(scan: Scan) -> NDArray[np.float32]:
+def _no_range(scan: Scan) -> NDArray[np.float32]:
     return np.full(len(scan), np.nan, np.float32)
 
 
 _READERS: tuple[Callable[[Scan, Columns], StatedReturns | None], ...] = (
-    _of_numbers,
-    _of_las_bits,
-    _of_types,
-    _of_tags,
-    _of_second_ranges,
+    _from_numbers,
+    _from_las_bits,
+    _from_types,
+    _from_tags,
+    _from_second_ranges,
 )

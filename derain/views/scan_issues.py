@@ -1,4 +1,4 @@
-"""What may be wrong with a scan; each method chooses which of it matters to itself."""
+"""Possible faults of a scan; each method chooses those that matter to it."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from derain.views.full_scale import FULL_SCALES
 # Intensities this many times off the training data's are of another unit.
 INTENSITY_MISMATCH = 30.0
 
-# Full scale of intensities, by the units that tell it.
+# Full scale of intensities, by the units that determine it.
 SCALE_OF_UNIT = {f"0..{scale:g}": scale for scale in FULL_SCALES}
 
 # What of a scan its full scale is read from: above it lie glints, and damaged values.
@@ -34,8 +34,8 @@ class ScanIssue:
     """One thing about a scan that may not suit a method.
 
     Attributes:
-        kind: What it is, in the same words for every scan that has it.
-        detail: How it shows in this one.
+        kind: Kind of issue, with the same text for every scan.
+        detail: Description of the issue in this scan.
     """
 
     kind: str
@@ -43,10 +43,10 @@ class ScanIssue:
 
 
 class ScanChecker(Protocol):
-    """What scans are judged by, and what can say of a scan beforehand whether it suits."""
+    """A method of judging scans that can check beforehand whether a scan suits it."""
 
     def issues(self, scan: Scan) -> Iterator[ScanIssue]:
-        """What is odd about a scan before it is judged.
+        """Warnings about a scan before it is judged.
 
         Args:
             scan: The scan, its intensities in the unit of the method. One without a point that can
@@ -55,29 +55,29 @@ class ScanChecker(Protocol):
 
 
 def missing_channels(scan: Scan, fill_value: Mapping[str, float], data: str) -> Iterator[ScanIssue]:
-    """Says which channels of a model a scan has not got.
+    """Yields an issue for each channel of a model that a scan lacks.
 
     Args:
         scan: The scan.
-        fill_value: The channels that it has not got, and the means that stand in for them.
+        fill_value: The channels that it lacks, and the means that replace them.
         data: Name of the data that the means are of.
     """
     if not scan.valid.any():
         return
     for name, mean in fill_value.items():
         lack, detail = _lack(scan) if name == "intensity" else (f"no {name}", f"no {name}")
-        yield ScanIssue(lack, f"{detail}: the mean of {data}, {mean:.3g}, stands in")
+        yield ScanIssue(lack, f"{detail}: replaced by the mean of {data}, {mean:.3g}")
 
 
 def missing_intensity(
     scan: Scan,
-    consequence: str = "nothing can be found without; name its column, or take default or dror",
+    consequence: str = "nothing can be found without it; name its column, or use default or dror",
 ) -> Iterator[ScanIssue]:
-    """Whether a scan lacks the intensity that a method needs.
+    """Yields an issue if a scan lacks the intensity that a method needs.
 
     Args:
         scan: The scan.
-        consequence: What that means for the method.
+        consequence: Its effect on the method.
     """
     if scan.measured_intensity is None and scan.valid.any():
         lack, detail = _lack(scan)
@@ -85,7 +85,7 @@ def missing_intensity(
 
 
 def intensity_unlike_training(scan: Scan, mean: float, unit: str, data: str) -> Iterator[ScanIssue]:
-    """Whether a scan's intensities are of another unit than a model's training data.
+    """Yields an issue if a scan's intensities have another unit than a model's training data.
 
     Args:
         scan: The scan.
@@ -108,7 +108,7 @@ def intensity_unlike_training(scan: Scan, mean: float, unit: str, data: str) -> 
 
 
 def intensity_of_another_scale(scan: Scan, expected: float, whose: str) -> Iterator[ScanIssue]:
-    """Whether a scan's intensities have another full scale than expected.
+    """Yields an issue if a scan's intensities have another full scale than expected.
 
     Args:
         scan: The scan.
@@ -131,11 +131,11 @@ def intensity_of_another_scale(scan: Scan, expected: float, whose: str) -> Itera
 
 
 def outside_view(scan: Scan, judged: NDArray[np.bool_], data: str) -> Iterator[ScanIssue]:
-    """Whether much of a scan lies outside what a model sees.
+    """Yields an issue if much of a scan lies outside the field of view of a model.
 
-    Only who judged the scan can say: to project it once more would take as long as the view. A
-    bench does not, whose methods give no more than what they call rain, and whose recall counts
-    the rain that they do not see as missed.
+    The caller passes the judged rows: to project the scan again would take as long as the view. A
+    bench does not call this: its methods return only the rain, and its recall counts the rain
+    outside the view as missed.
 
     Args:
         scan: The scan.
@@ -152,7 +152,7 @@ def outside_view(scan: Scan, judged: NDArray[np.bool_], data: str) -> Iterator[S
 
 
 def much_removed(share: float) -> Iterator[ScanIssue]:
-    """Whether a method calls more of a scan rain than rain ever was.
+    """Yields an issue if a method calls more of a scan rain than in any rain.
 
     Args:
         share: Share of the points that can be judged which it calls rain.
@@ -160,19 +160,19 @@ def much_removed(share: float) -> Iterator[ScanIssue]:
     if share > MOST_RAIN:
         yield ScanIssue(
             f"more than {MOST_RAIN:.0%} called rain",
-            f"{share:.0%} of the points are called rain, where the heaviest rain has "
+            f"{share:.0%} of the points are called rain, and the heaviest rain has "
             f"{HEAVIEST_RAIN:.0%}: the method may not suit the sensor",
         )
 
 
 def no_points(scan: Scan) -> Iterator[ScanIssue]:
-    """Whether a scan holds no points: by its format that may be, but it was hardly meant."""
+    """Yields an issue if a scan holds no points, which is valid but hardly intended."""
     if not len(scan):
         yield ScanIssue("no points", "it holds no points: the file may be a copy that failed")
 
 
 def left_out(scan: Scan) -> Iterator[ScanIssue]:
-    """Whether a scan's file holds what is not written with the cleaned scan."""
+    """Yields an issue if a scan's file has parts that are not written with the cleaned scan."""
     if isinstance(scan.header, PartialHeader) and scan.header.left_out:
         yield ScanIssue(
             "parts of the file that are not written",
@@ -188,7 +188,7 @@ def _lack(scan: Scan) -> tuple[str, str]:
     if values.min() == values.max():
         alike = f"intensity {values[0]:g} at every point, so that it was not measured"
         return "intensity not measured", alike
-    return "intensity not measured", "no intensity is a number that sensors measure"
+    return "intensity not measured", "no intensity is a possible value of a sensor"
 
 
 def _other_unit(smaller: bool) -> str:

@@ -1,4 +1,4 @@
-"""How a sensor scans, as its returns tell: field of view, beams, and steps between returns."""
+"""The scan pattern of a sensor, from its returns: field of view, beams, and angular steps."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ REAL_GAP = 30.0
 # Returns nearer to each other than this are of one beam or one shot, degrees: no sensor is finer.
 FINEST_STEP = 0.01
 
-# What a step is taken for where too few returns tell, degrees; usual of spinning sensors.
+# The step if there are too few returns to measure it, degrees; usual for spinning sensors.
 USUAL_STEP = 0.2
 
 # Clusters of inclination are beams if they take up at most this share of the field of view (beams
@@ -40,7 +40,7 @@ Extent = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class ReturnAngles:
-    """Where the returns of one scan came from.
+    """Directions of the returns of one scan.
 
     Attributes:
         azimuth: Of each valid point, float64 (N,), degrees in [-180, 180].
@@ -94,7 +94,7 @@ def inclination_extent(inclination: NDArray[np.float64]) -> Extent:
 
 
 def find_beams(scans: Sequence[ReturnAngles]) -> NDArray[np.float64]:
-    """Inclinations of the sensor's beams, where they can be told.
+    """Inclinations of the sensor's beams, if they can be found.
 
     Args:
         scans: Angles of the returns of one or more scans of one sensor.
@@ -105,8 +105,12 @@ def find_beams(scans: Sequence[ReturnAngles]) -> NDArray[np.float64]:
     """
     inclination = np.concatenate([scan.inclination for scan in scans])
     rows = [scan.row for scan in scans if scan.row is not None]
-    beams = _of_rows(inclination, np.concatenate(rows)) if len(rows) == len(scans) else np.zeros(0)
-    return (beams if beams.size else _of_clusters(np.sort(inclination)))[::-1]
+    beams = (
+        _beams_of_rows(inclination, np.concatenate(rows))
+        if len(rows) == len(scans)
+        else np.zeros(0)
+    )
+    return (beams if beams.size else _beams_of_clusters(np.sort(inclination)))[::-1]
 
 
 def azimuth_step(scans: Sequence[ReturnAngles], borders: Sequence[float]) -> float:
@@ -144,7 +148,7 @@ def _median_gap(scans: Sequence[tuple[NDArray[np.float64], NDArray[np.int64]]]) 
     return float(np.median(gaps)) if len(gaps) else USUAL_STEP
 
 
-def _of_rows(inclination: NDArray[np.float64], row: NDArray[np.int64]) -> NDArray[np.float64]:
+def _beams_of_rows(inclination: NDArray[np.float64], row: NDArray[np.int64]) -> NDArray[np.float64]:
     """Beams of an organised scan, a row each: ascending, float64 (beams,), degrees, or none."""
     by_row = np.lexsort((inclination, row))
     rows, starts, counts = np.unique(row[by_row], return_index=True, return_counts=True)
@@ -156,7 +160,7 @@ def _of_rows(inclination: NDArray[np.float64], row: NDArray[np.int64]) -> NDArra
     return beams if told_apart else np.zeros(0)
 
 
-def _of_clusters(ascending: NDArray[np.float64]) -> NDArray[np.float64]:
+def _beams_of_clusters(ascending: NDArray[np.float64]) -> NDArray[np.float64]:
     """Beams whose returns share one inclination: ascending, float64 (beams,), degrees, or none."""
     starts = np.flatnonzero(np.diff(ascending, prepend=-np.inf) > FINEST_STEP)
     ends = np.append(starts[1:], len(ascending))

@@ -1,4 +1,4 @@
-"""How neighbourhoods are scattered: along a line, over a surface, or through space."""
+"""The scatter of neighbourhoods: along a line, over a surface, or through space."""
 
 import math
 

@@ -214,7 +214,7 @@ def grid_of(config: str | Mapping[str, Any], source: str | Path) -> SphericalGri
         config: Name of a published grid; or a mapping with ``columns``, ``azimuth`` (right and
             left bound; all around by default) and how the rows lie: ``rows`` and ``inclination``
             (lower and upper bound), or ``beams``, or ``edges``. Degrees.
-        source: Where it was found, for messages.
+        source: Source of the entry, for messages.
 
     Raises:
         InputError: An unknown name, or something that does not describe a grid.
@@ -223,7 +223,7 @@ def grid_of(config: str | Mapping[str, Any], source: str | Path) -> SphericalGri
 
 
 def grid_at(entry: Entry) -> SphericalGrid:
-    """The grid that stands in a document, as :func:`grid_of` takes it.
+    """Reads a grid from a document, as :func:`grid_of` takes it.
 
     Raises:
         InputError: An unknown name, or something that does not describe a grid.
@@ -233,7 +233,7 @@ def grid_at(entry: Entry) -> SphericalGrid:
     if entry.value not in PUBLISHED_GRIDS:
         raise entry.fault(
             f"there is no grid named {shown(entry.value)}",
-            f"Known are {', '.join(PUBLISHED_GRIDS)}; or describe one by columns, rows and "
+            f"Available: {', '.join(PUBLISHED_GRIDS)}; or describe one by columns, rows and "
             "inclination.",
         )
     return _described(Entry(entry.source, entry.key, PUBLISHED_GRIDS[entry.value]))

@@ -1,4 +1,4 @@
-"""What every view of a scan can do: be a network's input, and carry its scores back."""
+"""The base class of views: conversion of a scan to a network's input, and back-projection."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
@@ -49,7 +49,7 @@ class ViewedScan(ABC):
 
     @abstractmethod
     def target(self, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """What the network is to say of each cell.
+        """Training target of each cell.
 
         Args:
             rain: Truth for every row of the scan, bool (N,).
@@ -61,7 +61,7 @@ class ViewedScan(ABC):
 
     @abstractmethod
     def back_projection(self) -> BackProjection:
-        """What carries scores to the scan's rows, without the inputs, which may be let go of."""
+        """Back-projection of scores to the scan's rows, without the inputs, which may be freed."""
 
     def back(self, score: NDArray[np.float32]) -> NDArray[np.float32]:
         """Carries the network's scores back to every row of the scan.
@@ -82,7 +82,7 @@ class ViewedScan(ABC):
 
 
 class View(ABC):
-    """How a scan becomes a network's input; the same in training and in deployment.
+    """Converts a scan into a network's input; the same in training and in deployment.
 
     A view enters derain by its file in ``derain/views``, or by an entry point ``derain.views`` of
     another package, and the decorator that gives it its name::
@@ -92,7 +92,7 @@ class View(ABC):
 
     Attributes:
         NAME: Its name in a Spec; the decorator sets it.
-        WEIGHS_INTENSITY: Whether it shows how bright points are, whatever the channels.
+        WEIGHS_INTENSITY: True if it shows how bright points are, whatever the channels.
     """
 
     NAME: ClassVar[str]
@@ -106,9 +106,9 @@ class View(ABC):
         """Reads back what :meth:`as_dict` gave. It is not trusted.
 
         Args:
-            entry: What stands under ``view`` in a Spec.
-            channels: What the network sees of a point, in order, as :meth:`Scan.channel` names it.
-            fill_value: What stands in for a value that a scan lacks, by channel.
+            entry: The entry ``view`` of a Spec.
+            channels: The network's input channels, in order, as :meth:`Scan.channel` names it.
+            fill_value: Replacement of a value that a scan lacks, by channel.
             threads: Threads that it may use; 0 takes every core this process may use.
 
         Raises:
@@ -122,7 +122,7 @@ class View(ABC):
     @property
     @abstractmethod
     def azimuth(self) -> tuple[float, float]:
-        """What it sees: right and left bound, degrees counter-clockwise from x."""
+        """Its field of view: right and left bound, degrees counter-clockwise from x."""
 
     @property
     def window(self) -> Window:
@@ -132,11 +132,11 @@ class View(ABC):
     def with_candidates(self, candidates: Candidates) -> "View":
         """The same view with cells for candidates alone; all other points are given score 0.
 
-        What the network says of a candidate must not change by it: whatever its score depends on
-        is seen as before. A view that cannot tell them apart refuses, as this one does.
+        The network's score of a candidate must not change: all inputs that it depends on stay in
+        the view. A view without candidates refuses, as this one does.
 
         Args:
-            candidates: Which points may be rain.
+            candidates: Points that may be rain.
 
         Raises:
             InputError: A view that sees every point alike.
@@ -150,7 +150,7 @@ class View(ABC):
         """Views a scan, alone."""
 
     def of_window(self, scans: WindowOfScans) -> ViewedScan:
-        """Views a scan among those around it, as many as :attr:`window` asks for or fewer.
+        """Views a scan among those around it, at most as many as :attr:`window`.
 
         Args:
             scans: The scan, with others of its sequence. What is seen has its rows, not theirs.

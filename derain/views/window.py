@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Window:
-    """How many scans before and after one a view asks for; none by default.
+    """Number of scans before and after one that a view needs; none by default.
 
     Attributes:
         before: Scans before it in its sequence.
-        after: Scans after it, for which whoever judges it has to wait.
+        after: Scans after it, for which the answer has to wait.
 
     Raises:
         InputError: Numbers below 0.
@@ -37,7 +37,7 @@ class Window:
 
     @property
     def is_one_scan(self) -> bool:
-        """Whether the view asks for nothing but the scan that is judged."""
+        """True if the view needs only the scan that is judged."""
         return not (self.before or self.after)
 
 
@@ -70,7 +70,7 @@ class PlacedScan:
 class WindowOfScans:
     """A scan that is to be judged, and those around it in its sequence.
 
-    Near the ends of a sequence there are fewer than the view's :class:`Window` asks for.
+    Near the ends of a sequence there are fewer than in the view's :class:`Window`.
 
     Attributes:
         judged: The scan that is to be judged.

@@ -1,4 +1,4 @@
-"""How bad the weather is, by rain and by range: shares of rain, visibility, reach, an alarm.
+"""The weather by rain and by range: shares of rain, visibility, reach, an alarm.
 
 A ray ends at the first drop that it meets, or else at the last thing that it meets. Counts of rays
 by where they end and at what are all that is kept of a scan; they add up over scans.

@@ -10,7 +10,7 @@ from derain.weather.visibility import NOT_KNOWN, Visibility
 
 
 class Level(IntEnum):
-    """How bad the visibility is, in the numbers of ROS's diagnostics: OK, WARN and ERROR."""
+    """Level of visibility, in the numbers of ROS's diagnostics: OK, WARN and ERROR."""
 
     CLEAR = 0
     WARNING = 1
@@ -22,7 +22,7 @@ class Level(IntEnum):
 
 @dataclass(frozen=True)
 class Threshold:
-    """Where a level begins, and where it ends.
+    """The visibilities at which a level begins and ends.
 
     Example:
         >>> alarm = Alarm(warning=Threshold(below=50, above=60), error=Threshold(10, 12), hold=3)
@@ -64,11 +64,11 @@ class Latch:
     """One level, on or off.
 
     Attributes:
-        threshold: Where it begins, and where it ends.
-        hold: So many scans in a row change it.
-        on: Whether it is on.
-        against: How many of the last scans in a row speak for a change; before the first scan one
-            less than ``hold``, so that it alone can change the level.
+        threshold: The bounds at which it begins and ends.
+        hold: Number of consecutive scans that change it.
+        on: True if it is on.
+        against: Number of consecutive scans so far that agree on a change; before the first scan
+            one less than ``hold``, so that it alone can change the level.
     """
 
     threshold: Threshold
@@ -80,7 +80,7 @@ class Latch:
         """Takes the visibility of the next scan.
 
         A scan whose interval lies on both sides of the threshold changes nothing, and neither does
-        one of which nothing is known: the count goes on with the scan after it.
+        a scan without a value: the count continues with the scan after it.
         """
         least, most = visibility.at_least, visibility.at_most
         if self.on:
@@ -112,9 +112,10 @@ class Alarm:
         ['clear', 'clear', 'error', 'error', 'error', 'error', 'clear']
 
     Args:
-        warning: Where the warning begins and ends.
-        error: Where the error does.
-        hold: How many scans in a row have to agree before the level changes; 1 changes at once.
+        warning: Bounds of the warning.
+        error: Bounds of the error.
+        hold: Number of consecutive scans that have to agree before the level changes; 1 changes at
+            once.
         dry: The reach of the same sensor in dry scans of the same kind of place
             (:func:`~derain.weather.scan_weather.dry_reach`); None leaves reach out.
 
@@ -163,7 +164,7 @@ class Alarm:
         return self.level
 
     def level_of(self, visibility: Visibility, reach: Visibility = NOT_KNOWN) -> Level | None:
-        """The level of one scan by itself, whatever came before it.
+        """The level of one scan by itself, without those before it.
 
         Returns:
             The worst level that its whole interval lies below; None where there is none and the

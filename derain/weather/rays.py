@@ -1,4 +1,4 @@
-"""Where each ray of a scan ends, and whether at rain.
+"""The end of each ray of a scan, and whether it is rain.
 
 Returns in one direction are of one ray: the copies of a return that dual-return sensors write, and
 what stands behind a drop. They are found by direction alone, in a small part of the time of
@@ -120,7 +120,7 @@ SECTOR_OF_CELL = _sectors_of_cells()
 
 
 def _scores(reach: NDArray[np.float32], rain: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """How far returns go before others of their ray, int32 (M,): rain first, the nearest of it."""
+    """Priority of returns among those of their ray, int32 (M,): rain first, the nearest of it."""
     place = reach * np.float32(1 / BIN)
     np.minimum(place, RANGE_BINS - 1, out=place)  # not above the last bin, however far
     scores = place.astype(np.int32)
@@ -171,7 +171,7 @@ def repetitions(numbers: NDArray[np.uint32]) -> tuple[NDArray[np.intp], NDArray[
 
 
 def seem_distinct(numbers: NDArray[np.uint32]) -> bool:
-    """Whether a sample shows that next to none of the numbers repeats another.
+    """True if a sample shows that next to none of the numbers repeats another.
 
     The sample is of values, not of places, so that it has all that equal one of it. Of few numbers
     the answer is no.
@@ -195,7 +195,7 @@ def _last_in_slot(
     multiplier: int,
     table: NDArray[np.int32],
 ) -> NDArray[np.int32]:
-    """The place that stands in the slot of each number, after all have written theirs there."""
+    """The last place written to the slot of each number."""
     lower = np.uint32(33 - len(table).bit_length())
     slot = (numbers * np.uint32(multiplier) >> lower).astype(np.intp)
     table[slot] = places  # only slots that were written to are read, so that it needs no zeros

@@ -18,7 +18,7 @@ SHARE_DIGITS = 5
 
 @dataclass(frozen=True)
 class WeatherRecord:
-    """The weather of one scan; None stands for what is not known.
+    """The weather of one scan; None stands for an unknown value.
 
     Attributes:
         rays: Its rays.

@@ -44,11 +44,11 @@ class ScanWeather:
 
     @classmethod
     def of(cls, points: Scan | NDArray[Any], rain: NDArray[np.bool_]) -> Self:
-        """What a scan shows.
+        """The weather of a judged scan.
 
         Args:
             points: A Scan, or (N, ≥ 3) numbers: x, y, z in metres, in the frame of the sensor.
-            rain: What is rain of it by labels or by any method, bool (N,).
+            rain: Its rain by labels or by any method, bool (N,).
 
         Raises:
             InputError: Points of another shape, or not one answer for each.
@@ -58,7 +58,7 @@ class ScanWeather:
             raise InputError(
                 "rain",
                 f"it is {rain.dtype} of shape {rain.shape} for {len(scan):,} points",
-                "Give one truth value for each point.",
+                "Give True or False for each point.",
             )
         return cls(ray_ends(scan, rain))
 
@@ -120,11 +120,11 @@ class ScanWeather:
 
     @cached_property
     def reach(self) -> Visibility:
-        """The range within which 99 % of the rays end, whatever they end at."""
+        """The range within which 99 % of the rays end, at rain or anything else."""
         return self.range_of(SHARE_REACHED)
 
     def range_of(self, share: float) -> Visibility:
-        """The range within which a share of the rays end, whatever they end at.
+        """The range within which a share of the rays end, at rain or anything else.
 
         Args:
             share: Of the rays, such as 0.95.
@@ -155,7 +155,7 @@ def dry_reach(dry: Iterable[ScanWeather]) -> Visibility:
     them. Not known where none of them has 100 rays.
 
     Args:
-        dry: What each dry scan shows.
+        dry: Weather of each dry scan.
     """
     known = sorted((one.reach for one in dry if one.reach.known), key=lambda reach: reach.at_least)
     return known[int(SHARE_OF_DRY_BELOW * len(known))] if known else NOT_KNOWN

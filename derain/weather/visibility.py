@@ -1,4 +1,4 @@
-"""How far a sensor sees, by the rain that its rays meet and by the range that they reach."""
+"""Visibility, by the rain that rays meet, and reach, by the range at which they end."""
 
 import math
 from dataclasses import dataclass
@@ -47,7 +47,7 @@ class Visibility:
 
     @property
     def known(self) -> bool:
-        """Whether the scan has enough rays for an interval."""
+        """True if the scan has enough rays for an interval."""
         return self.at_least > 0 or self.at_most < math.inf
 
     @property

@@ -1,1 +1,1 @@
-"""What commands do, as functions: odometry, teaching, training, learning from a recording."""
+"""The longer commands as functions: odometry, teaching, training, learning from a recording."""

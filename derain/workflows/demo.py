@@ -51,15 +51,15 @@ TRIALS = 100
 
 @dataclass(frozen=True)
 class DemoConfig:
-    """What the demonstration does. Another than the usual one takes less time.
+    """Options of the demonstration. Options other than the defaults make it shorter.
 
     Attributes:
         out: Folder that everything is written to.
-        streets: What is simulated.
+        streets: The campaign to simulate.
         networks: Networks that are trained, titles of ``DEMO_NETWORKS``.
         others: Methods that they are compared with.
         settings: Settings of every training, as :func:`derain.workflows.fit.fit` takes them.
-        effort: How much is timed in the comparison.
+        effort: Amount of timing in the comparison.
         scan: A scan of your own, or a folder of them; None for the example that comes with derain.
         columns: Names of the columns of its file, where that does not name them.
         workers: Processes of the simulation.
@@ -94,14 +94,14 @@ def run_demo(config: DemoConfig, show: Show = show_nothing) -> Bench:
     """Cleans what is given, and then simulates, tunes, trains, exports, cleans and compares.
 
     Args:
-        config: What is done.
+        config: Options of the demonstration.
         show: Receives a line for each step, and lines for its result.
 
     Returns:
         The comparison.
 
     Raises:
-        InputError: What a step raises.
+        InputError: The error of a step.
     """
     # Cleaning, simulation, tuning, picture and comparison; cleaning once more by the first network.
     steps = Steps(show, 5 + 2 * len(config.networks) + bool(config.networks))
@@ -214,13 +214,13 @@ def _compare(config: DemoConfig, data: ScanData, steps: Steps) -> Bench:
 
 
 class Watch(CleaningObserver):
-    """Warns of what is odd about scans, and finds what of the example's rain is removed.
+    """Prints warnings about scans, and counts the removed rain of the example.
 
     Args:
         labels: Folder of the labels that the scans get.
 
     Attributes:
-        truth: What of the rain of the example is found.
+        truth: Counts of the example's rain.
     """
 
     def __init__(self, labels: Path) -> None:
@@ -229,7 +229,7 @@ class Watch(CleaningObserver):
         self._notices = Notices()
 
     def noticed(self, scan: str, odd: list[ScanIssue]) -> None:
-        """Warns of what is odd about a scan."""
+        """Prints warnings about a scan."""
         self._notices.warn(scan, odd)
 
     def cleaned(self, outcome: ScanOutcome) -> None:

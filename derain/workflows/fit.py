@@ -55,7 +55,7 @@ def fit(
             the whole configuration.
         settings: Values of the options of ``derain fit``, by name: ``{"data.root": "WADS",
             "trainer.max_epochs": 5}``. They replace those of the configuration.
-        quiet: Whether a line for each epoch stands for all that Lightning prints.
+        quiet: True if a line for each epoch stands for all that Lightning prints.
 
     Raises:
         InputError: A configuration, option or checkpoint that cannot be used, a folder that cannot

@@ -50,7 +50,7 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
         derain.errors.InputError: scan.bin: 1 scan: too few to learn from ...
 
     Args:
-        config: What is learnt from what.
+        config: Options of the run.
         show: Receives a line for each step, and one for its result.
 
     Returns:
@@ -65,8 +65,8 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
         scans = "1 scan" if len(source) == 1 else f"{len(source)} scans"
         raise InputError(
             config.recordings[0],
-            f"{scans}: too few to learn from some and choose by others",
-            f"Record {FEWEST_SCANS} or more, one right after the other; twenty are enough.",
+            f"{scans}: too few for training and validation",
+            f"Record {FEWEST_SCANS} or more, one after the other; twenty are enough.",
         )
     student = student_of(config, source)
     require_writable(config.out)
@@ -74,7 +74,7 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
     keep_freed_memory()
     show(f"{len(source):,} scans to learn from. Everything but the model goes to {config.work}/")
     if student.blind and not config.blind and student.start is None:
-        show("The scans have no intensities: the network learns without.")
+        show("The scans have no intensities: the network is trained without them.")
     steps = Steps(show, LEARN_STEPS + config.needs_odometry(source))
     with recorded_warnings() as warnings:
         poses = _find_poses(config, source, steps)
@@ -118,7 +118,7 @@ def commands(config: LearnConfig, student: Student, source: Source, poses: str |
     """Commands that repeat the steps of :func:`learn`.
 
     Args:
-        config: What is learnt.
+        config: Options of the run.
         student: The network that learns.
         source: The scans.
         poses: Poses that the teacher is given; None for those beside the scans.
@@ -128,9 +128,9 @@ def commands(config: LearnConfig, student: Student, source: Source, poses: str |
     steps: list[Sequence[str]] = []
     if config.needs_odometry(source):
         steps += [("odometry", *scans, "--out", str(_poses_file(config, source)), *columns)]
-    given = () if poses is None else ("--poses", poses)
+    pose_options = () if poses is None else ("--poses", poses)
     steps += [
-        ("teach", config.teacher, *scans, "--out", taught, *given, *columns),
+        ("teach", config.teacher, *scans, "--out", taught, *pose_options, *columns),
         ("fit", *fit_options(student.config, _settings(config, student))),
         ("export", str(config.checkpoint), "--out", str(config.out)),
     ]
@@ -150,16 +150,14 @@ def _settings(config: LearnConfig, student: Student) -> dict[str, object]:
 
 
 def _clear(work: Path) -> None:
-    """Makes the folder of everything but the model anew.
+    """Empties the folder of everything but the model.
 
     Raises:
         InputError: It holds something that no earlier run has written.
     """
     mark = work / MARK
     if work.is_dir() and any(work.iterdir()) and not mark.is_file():
-        raise InputError(
-            work, "holds something other than what an earlier run left", "Give another --work."
-        )
+        raise InputError(work, "holds files that no earlier run wrote", "Give another --work.")
     require_writable(mark)
     for left in work.iterdir():
         shutil.rmtree(left) if left.is_dir() and not left.is_symlink() else left.unlink()
@@ -168,7 +166,7 @@ def _clear(work: Path) -> None:
 
 
 def _warning_guard() -> Guard:
-    """Turns what is wrong with one scan into a warning; the others go on."""
+    """Turns the error of one scan into a warning; the others go on."""
     return Failures(lambda error: warn(str(error))).skipping_failures
 
 
@@ -222,7 +220,7 @@ def _refuse_clean(results: LearnResults) -> None:
     """Refuses to train on a recording in which the teacher has found nothing to learn.
 
     Raises:
-        InputError: No point of which it is sure, or hardly any rain among them.
+        InputError: No sure point, or hardly any rain among the sure points.
     """
     taught = results.taught
     if taught.shares[2] == 1 or not taught.points:

@@ -1,4 +1,4 @@
-"""What is learnt from which recording, and by which network."""
+"""Options of learning: the recording, the teacher and the network."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ BLIND = {"outdet": "[x,y,z]", "salsanext": "[range,x,y,z]", "salsanext_lite": "[
 
 @dataclass(frozen=True)
 class LearnConfig:
-    """What is learnt from what.
+    """Options of :func:`derain.workflows.learn.learn`.
 
     Example:
         >>> config = LearnConfig([Path("drive")], Path("model.onnx"), epochs=5)
@@ -43,7 +43,7 @@ class LearnConfig:
         teacher: Name of the teacher, or the file of a model.
         poses: Poses of the scans, as the option ``--poses`` takes them; None for those beside the
             scans, and for odometry where there are none.
-        blind: Whether the network learns without intensity.
+        blind: True if the network learns without intensity.
         columns: Names of the columns of files that do not name them.
         epochs: Epochs of the training; None for those of the network's configuration.
         card: Data card of the scans' own labels, which measure the finished model; None measures
@@ -87,7 +87,7 @@ class LearnConfig:
         return self.work / "student.ckpt"
 
     def needs_odometry(self, source: Source) -> bool:
-        """Whether poses are to be found before the teaching.
+        """True if poses are to be found before the teaching.
 
         The configuration names odometry, or the teacher needs poses that no file states.
 
@@ -107,7 +107,7 @@ class Student:
 
     Attributes:
         network: Its name.
-        blind: Whether it sees no intensity.
+        blind: True if it sees no intensity.
         start: The trained model that it begins with; None where its weights are drawn at random.
         config: The packaged configuration of its training.
         settings: Settings of the network over that configuration, as
@@ -124,7 +124,7 @@ class Student:
 
     @property
     def sees_unit(self) -> bool:
-        """Whether it sees intensity in the unit of its scans; cues do as each scan shows it."""
+        """True if it sees intensity in the unit of its scans; cues do as each scan shows it."""
         return not self.blind and self.network != CUES
 
     def __str__(self) -> str:
@@ -137,7 +137,7 @@ def student_of(config: LearnConfig, source: Source) -> Student:
     """The network that learns from a recording: one with a start sees what that sees.
 
     Args:
-        config: What is learnt.
+        config: Options of the run.
         source: The scans; without intensities, the student is blind to them.
 
     Raises:
@@ -151,15 +151,15 @@ def student_of(config: LearnConfig, source: Source) -> Student:
         network = config.model or STUDENTS[0]
         blind = not sees_intensity and network != CUES
         if network == CUES:
-            _refuse_blind(config.blind, f"{CUES} weighs intensity, as each scan shows it")
+            _refuse_blind(config.blind, f"{CUES} uses intensity")
     else:
         spec = _spec_of_start(config, start)
         network, blind = spec.network, not spec.weighs_intensity
         if "intensity" in spec.channels and not sees_intensity:
             raise InputError(
                 config.recordings[0],
-                f"has no intensities, which {start} sees",
-                "Give a start that is blind to intensity, or name a network by --model.",
+                f"has no intensities, which {start} needs",
+                "Give --start a model without intensity, or name a network by --model.",
             )
     file, settings = _configuration(network)
     if start is not None:
@@ -171,7 +171,7 @@ def student_of(config: LearnConfig, source: Source) -> Student:
 
 
 def _spec_of_start(config: LearnConfig, start: str) -> Spec:
-    """How the model of the start is used."""
+    """The Spec of the model to start from."""
     from derain.models.checkpoint import load_model
 
     checkpoint = checkpoint_of(start)
@@ -196,7 +196,7 @@ def _spec_of_start(config: LearnConfig, start: str) -> Spec:
 
 def _refuse_blind(blind: bool, reason: str) -> None:
     if blind:
-        remedy = "Leave it out, or learn by another network or from another start."
+        remedy = "Leave it out, or give another --model or --start."
         raise InputError("--blind", reason, remedy)
 
 

@@ -16,8 +16,8 @@ from derain.pictures.scan_pictures import save
 LEAST_RAIN = 0.001
 DOUBTFUL_RAIN = 0.01
 
-# Bounds beyond which the report raises no doubt. They choose nothing: they are what a reader is
-# to look at.
+# Bounds beyond which the report raises no doubt. They change no result; they only direct the
+# reader's attention.
 ENOUGH_SCANS = 10
 ENOUGH_KNOWN = 0.7
 ENOUGH_AGREEMENT = 0.7
@@ -26,28 +26,28 @@ MORE_THAN_TAUGHT = 1.5
 MORE_BY = 0.005
 
 ALWAYS = """\
-- The held-out scans are of the same drive as those that the student learnt from. They measure
-  nothing of another sensor, another mounting, heavier rain or another kind of it.
-- Agreement is not truth: where the teacher errs in the same way again and again, such as on cars
-  that move as it does, the student learns the error, and the agreement does not show it. The
-  pictures do: look for red and blue on things.
+- The held-out scans are of the same drive as those that the student learnt from. They do
+  not measure another sensor, another mounting, heavier rain or another kind of rain.
+- Agreement is not truth: the student also learns errors that the teacher repeats, such as on cars
+  that move as it does, and the agreement does not show them. The pictures do: look for red and blue
+  on things.
 - Run the model on a recording in dry air, and check that it removes nothing: `derain run` prints
   the share."""
 
 AGREEMENT_EXPLAINED = """\
 P, R and IoU compare the student with the teacher as if that were the truth, on the points of
 held-out scans that the teacher is sure of. A student can be better than its teacher: it does not
-learn errors that the teacher makes only now and then."""
+learn errors that the teacher makes only occasionally."""
 
 
 BESIDE_PERSISTENCE = """\
-Persistence goes by free space alone: rain is what rays of the scans before and after went through,
-however bright it is. On held-out scans, beside this teacher:"""
+Persistence uses free space alone: a point is rain if rays of the scans before and after pass
+through its place, at any brightness. Compared with this teacher on held-out scans:"""
 
 
 @dataclass
 class LearnResults:
-    """What was learnt from a recording.
+    """The results of learning from a recording.
 
     Attributes:
         title: The recording.
@@ -59,10 +59,10 @@ class LearnResults:
         evaluated: The student's answers beside them on held-out scans; none before it is trained.
         persistence: Persistence's answers on held-out scans, and beside them what the teacher calls
             rain; None where they are not compared.
-        stood: Whether the sensor stood, by the configuration.
-        sees_intensity: Whether the student does, in the unit of this recording.
+        stood: True if the sensor was at rest, by the configuration.
+        sees_intensity: True if the student does, in the unit of this recording.
         warnings: Warnings of all steps, in order.
-        pictures: What each picture shows, by file in the folder of the report.
+        pictures: Title of each picture, by file in the folder of the report.
         record: Scores by the scans' own labels, in Markdown; empty where none were measured.
         commands: Commands that repeat the steps.
     """
@@ -94,7 +94,7 @@ class LearnResults:
 
     @property
     def trained_on(self) -> int:
-        """How many scans the student learns from."""
+        """Number of scans that the student learns from."""
         return sum(not scan.held_out for scan in self.scans)
 
     def __str__(self) -> str:
@@ -136,27 +136,27 @@ def as_markdown(results: LearnResults) -> str:
     """The text of the report."""
     held_out = len(results.scans) - results.trained_on
     parts = [
-        f"# What was learnt from {results.title}",
+        f"# Learning from {results.title}",
         str(results),
         f"{results.trained_on:,} scans to learn from, {held_out:,} held out: these choose the best "
-        "epoch and measure the student, which does not learn from them. No person's label is read "
-        "for any of this.",
-        "## What could not be learnt, and when not to trust it",
+        "epoch and measure the student, which does not learn from them. No labels by people are "
+        "read for any of this.",
+        "## Limits of the model",
         "\n".join([*(f"- {doubt}" for doubt in doubts(results)), ALWAYS]),
     ]
     parts += [
         f"## The teacher: {results.teacher}",
-        _table(("not rain", "rain", "not known"), results.taught, _of_teacher),
+        _table(("not rain", "rain", "not known"), results.taught, _teacher_cells),
     ]
     if results.persistence is not None:
         header = ("rain to persistence", "not known to it", "rain to the teacher")
-        parts += [BESIDE_PERSISTENCE, _table(header, results.persistence, _of_persistence)]
+        parts += [BESIDE_PERSISTENCE, _table(header, results.persistence, _persistence_cells)]
     parts += _pictures(results.pictures, "teacher")
     if results.evaluated:
         parts += [
             f"## The student: {results.student}",
             AGREEMENT_EXPLAINED,
-            _table(("removed", "P", "R", "IoU"), results.agreement, _of_student),
+            _table(("removed", "P", "R", "IoU"), results.agreement, _student_cells),
         ]
         parts += _pictures(results.pictures, "removed")
         parts += ["## Held-out scans", *_pictures(results.pictures, "held_out")]
@@ -167,7 +167,7 @@ def as_markdown(results: LearnResults) -> str:
 
 
 def doubts(results: LearnResults) -> Iterator[str]:
-    """What a reader should know before trusting the model, a sentence or two each."""
+    """Reasons for caution before trusting the model, a sentence or two each."""
     taught = results.taught
     known = 1 - taught.shares[2]
     if taught.rain_among_known < LEAST_RAIN:
@@ -179,8 +179,8 @@ def doubts(results: LearnResults) -> Iterator[str]:
     elif taught.rain_among_known < DOUBTFUL_RAIN:
         yield (
             f"Little rain was found ({taught.rain_among_known:.2%} of the points that the teacher "
-            "is sure of): leaves and boughs alone may come to as much in dry air. Check in the "
-            "pictures what is removed."
+            "is sure of): in dry air, leaves and boughs alone may be labelled as much. Check the "
+            "removed points in the pictures."
         )
     if results.trained_on < ENOUGH_SCANS:
         yield (
@@ -195,8 +195,8 @@ def doubts(results: LearnResults) -> Iterator[str]:
     yield from _doubts_of_teacher(results)
     if results.stood:
         yield (
-            "The sensor stood: all scans show one place. Drive a little, or record in several "
-            "places, if the model is to be used while driving."
+            "The sensor was at rest: all scans show one place. Drive a little, or record in "
+            "several places, if the model is to be used while driving."
         )
     yield from _doubts_of_student(results)
     if results.warnings:
@@ -212,15 +212,15 @@ def _doubts_of_teacher(results: LearnResults) -> Iterator[str]:
     known = 1 - results.persistence.shares[2]
     if known < ENOUGH_KNOWN:
         yield (
-            f"Persistence, beside which the teacher is compared, is sure of {known:.0%} of the "
-            "points only: nothing but the teacher itself supports most of its labels."
+            f"Persistence, the comparison for the teacher, is sure of only {known:.0%} of the "
+            "points: it cannot confirm most of the teacher's labels."
         )
     for name, band in coarse_bands(results.persistence).items():
         rain = band.shares[1]
         if rain > max(MORE_THAN_TAUGHT * band.removed, band.removed + MORE_BY):
             yield (
                 f"At {name} persistence is sure that {rain:.1%} of the points are rain, and the "
-                f"teacher calls {band.removed:.1%} so: it may be blind to this rain. Compare with "
+                f"teacher labels {band.removed:.1%} as rain: it may miss this rain. Compare with "
                 "`--teacher persistence`."
             )
 
@@ -253,7 +253,7 @@ def _doubts_of_student(results: LearnResults) -> Iterator[str]:
     if results.sees_intensity:
         yield (
             "The student sees intensity in the unit of this recording: for a sensor of another "
-            "unit, learn anew or with --blind."
+            "unit, learn again, or with --blind."
         )
 
 
@@ -266,15 +266,15 @@ def _table(
     return markdown_table(("range", "points", *header), rows)
 
 
-def _of_teacher(band: Answers) -> Iterable[str]:
+def _teacher_cells(band: Answers) -> Iterable[str]:
     return [f"{share:.1%}" for share in band.shares]
 
 
-def _of_persistence(band: Answers) -> Iterable[str]:
+def _persistence_cells(band: Answers) -> Iterable[str]:
     return [f"{share:.1%}" for share in (*band.shares[1:], band.removed)]
 
 
-def _of_student(band: Answers) -> Iterable[str]:
+def _student_cells(band: Answers) -> Iterable[str]:
     counts = band.agreement
     scores = map(number_text, (counts.precision, counts.recall, counts.iou))
     return f"{band.removed:.1%}", *scores

@@ -40,10 +40,10 @@ class FoundPoses:
     """The poses of one recording; as text, a summary in one line.
 
     Attributes:
-        file: Where they are written.
+        file: The file or folder to write to.
         frames: The scans, in time order.
-        registrations: How each scan was registered, one a scan.
-        times: When the scans were taken, seconds; empty where that is not known of all.
+        registrations: Registration of each scan.
+        times: Times of the scans, seconds; empty unless all are known.
         fault: Why the file could not be written; None where it is.
     """
 
@@ -55,7 +55,7 @@ class FoundPoses:
 
     @property
     def untrusted(self) -> int:
-        """How many scans could not be registered."""
+        """Number of scans that could not be registered."""
         return sum(not each.trusted for each in self.registrations)
 
     def __str__(self) -> str:
@@ -94,9 +94,9 @@ def find_poses(
     Args:
         source: Scans of one recording or more, in time order.
         out: The file of the only recording; of several, a folder with ``<sequence>.txt`` for each.
-        form: What a line of a file is: ``kitti``, twelve numbers of a matrix, or ``tum``, time,
+        form: Format of a line of a file: ``kitti``, twelve numbers of a matrix, or ``tum``, time,
             position and quaternion.
-        replace: Whether poses that came with the scans may be replaced.
+        replace: True if poses that came with the scans may be replaced.
         threads: Threads to use; 0 takes every core.
         guard: Surrounds the reading of each scan; one whose error it holds back is not trusted.
         watch: Receives each registration.
@@ -174,9 +174,9 @@ def _write(found: FoundPoses, form: PoseFormat) -> None:
     if len(registrations) > 1 and not any(each.trusted for each in registrations[1:]):
         raise InputError(
             found.file,
-            "was not written: no two scans of the recording could be laid upon one another "
+            "was not written: no two scans of the recording could be registered to one another "
             f"({registrations[1].reason})",
-            "See that they are consecutive, in order of time, and of one sensor.",
+            "Check that they are consecutive, in order of time, and of one sensor.",
         )
     poses = np.array([each.pose for each in registrations])
     times = np.array(found.times) if form == "tum" else None
@@ -189,7 +189,7 @@ def _files_of(recordings: Sequence[Sequence[Frame]], out: Path, replace: bool) -
     Args:
         recordings: The recordings.
         out: The file of the only one; of several, a folder with ``<sequence>.txt`` for each.
-        replace: Whether poses that came with the scans may be replaced.
+        replace: True if poses that came with the scans may be replaced.
 
     Raises:
         InputError: A file that cannot be written, that came with the scans, or that two recordings
@@ -204,7 +204,7 @@ def _files_of(recordings: Sequence[Sequence[Frame]], out: Path, replace: bool) -
                 recording[0].name,
                 f"another recording is called {recording[0].sequence} too, and the poses of both "
                 f"would be {file}",
-                "Take them in two runs, each to its --out.",
+                "Process them in two runs, each to its --out.",
             )
         _refuse_to_overwrite(file, recording, replace)
         require_writable(file)
@@ -235,7 +235,7 @@ def _refuse_to_overwrite(file: Path, recording: Sequence[Frame], replace: bool) 
 
 
 def _times(recording: Sequence[Frame], form: PoseFormat) -> list[float]:
-    """When the scans of a recording were taken, seconds; empty where not all of it is known.
+    """Times of the scans of a recording, seconds; empty if not all of them are known.
 
     Raises:
         InputError: Times that are missing or do not ascend, for ``tum``.
@@ -247,16 +247,16 @@ def _times(recording: Sequence[Frame], form: PoseFormat) -> list[float]:
         lacking = next(frame for frame in recording if frame.time is None)
         raise InputError(
             lacking.name,
-            "its time is not known, and a line of TUM's form begins with the time",
-            "Write a times.txt beside the scans, a line of seconds each, or take --format kitti.",
+            "its time is not known, and a line of TUM's format begins with the time",
+            "Write a times.txt beside the scans, a line of seconds each, or use --format kitti.",
         )
     # Poses are found again by their times, which have to ascend.
     for (earlier, later), frame in zip(pairwise(times), recording[1:], strict=True):
         if later <= earlier:
             raise InputError(
                 frame.name,
-                f"was taken at {later:.3f} s, the scan before it at {earlier:.3f} s, and lines of "
-                "TUM's form go by ascending time",
-                "Name the scans in the order that they were taken in, or take --format kitti.",
+                f"was taken at {later:.3f} s, the scan before it at {earlier:.3f} s, and TUM's "
+                "format requires ascending times",
+                "Name the scans in the order that they were taken in, or use --format kitti.",
             )
     return times

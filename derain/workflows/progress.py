@@ -1,4 +1,4 @@
-"""How far a long work is: its steps, and the epochs of a training, with their times."""
+"""Progress of long work: its steps, and the epochs of a training, with their times."""
 
 import math
 import sys

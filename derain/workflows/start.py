@@ -1,4 +1,4 @@
-"""What a user may name to start a training from: a checkpoint, or the model that it became."""
+"""The start of a training that a user may name: a checkpoint, or the model exported from it."""
 
 from pathlib import Path
 

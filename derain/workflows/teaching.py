@@ -23,7 +23,7 @@ class TeachResults:
 
     Attributes:
         manifest: The labelled scans, as written; not finished while other shards are to be done.
-        judged: How many scans were judged; those of which nothing is known have no labels.
+        judged: Number of judged scans; those of which nothing is known have no labels.
         answers: Counts of the labels by range.
         record: Scores by the scans' own labels; None where there is no card.
     """
@@ -35,7 +35,7 @@ class TeachResults:
 
     @property
     def held_out(self) -> int:
-        """How many of the labelled scans are held out."""
+        """Number of labelled scans that are held out."""
         return sum(scan.part == HELD_OUT_PART for scan in self.manifest.scans)
 
 
@@ -60,7 +60,7 @@ def teach_recordings(
         card: Data card of the scans, whose own labels measure the teacher's; they change nothing.
         guard: Surrounds the work on each scan; one whose error it holds back gets no labels.
         watch: Receives each scan.
-        division: How the scans are divided into units; see :func:`derain.annotation.teach.teach`.
+        division: Division of the scans into units; see :func:`derain.annotation.teach.teach`.
         executor: Does the units; None does them in this process.
         placing: Finds where the scans were taken; see :func:`derain.annotation.teach.teach`.
 
@@ -91,8 +91,11 @@ def teach_recordings(
 
 def _warn_of_little(results: TeachResults) -> None:
     if unlabelled := results.judged - len(results.manifest.scans):
-        warn(f"{unlabelled:,} of {results.judged:,} scans are left out: nothing is known of them")
+        warn(
+            f"{unlabelled:,} of {results.judged:,} scans are left out: "
+            "the method is sure of none of their points"
+        )
     if not results.answers.rain:
         warn("no rain was found: a network would learn that nothing is rain")
     if not results.held_out:
-        warn("no scan is held out, for that a sequence needs three: all are for training")
+        warn("no scan is held out, which takes three scans of a sequence: all are for training")

@@ -93,7 +93,7 @@ class ExamplesFormatter(argparse.RawDescriptionHelpFormatter, DefaultHelpFormatt
 
 
 def choices() -> dict[str, tuple[type, ...]]:
-    """What has options of its own, by the option that chooses it.
+    """Classes with options of their own, by the option that chooses them.
 
     They are loaded then, and a configuration may name their classes without a module.
     """

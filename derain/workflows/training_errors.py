@@ -24,7 +24,7 @@ _UNKNOWN = (
 _SECTION = re.compile(r'Parser key "([^"]+)"')
 _ARGUMENT = re.compile(r"argument (?:--)?(?P<option>\S+): (?P<fault>.*)")
 _EXPECTED = re.compile(r"Expected an? <class '(?P<kind>[^']+)'>")
-_GIVEN = re.compile(r"(?:Got|Given) value: (?P<value>.*)$", re.MULTILINE)
+_VALUE = re.compile(r"(?:Got|Given) value: (?P<value>.*)$", re.MULTILINE)
 
 # Options that stand for themselves in other programs, and have a section here.
 OF_OTHER_PROGRAMS = {
@@ -96,10 +96,10 @@ def _unusable(subject: str, message: str) -> InputError:
     kinds = [found["kind"] for line in faults if (found := _EXPECTED.match(line))]
     kinds = [kind for kind in dict.fromkeys(kinds) if kind != "NoneType"]
     others = list(dict.fromkeys(line for line in faults if not _EXPECTED.match(line)))
-    given = _GIVEN.search(message)
-    if others or not (kinds and given):
+    value = _VALUE.search(message)
+    if others or not (kinds and value):
         return InputError(subject, "; ".join(others or faults), HINT)
-    return InputError(subject, f"cannot be {given['value']}", f"Give: {' or '.join(kinds)}.")
+    return InputError(subject, f"cannot be {value['value']}", f"Give: {' or '.join(kinds)}.")
 
 
 def of_the_trainer(error: Exception) -> InputError:

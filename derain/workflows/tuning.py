@@ -34,7 +34,7 @@ def bounds_of_rain(data: ScanData, frames: Sequence[Frame], inside: float) -> Ca
     """Bounds that hold a share of the scans' rain; None if no bounds separate rain from the rest.
 
     Args:
-        data: How the scans are read.
+        data: Options for reading scans.
         frames: The scans.
         inside: The share, 0 to 1.
 
@@ -64,11 +64,11 @@ def tune_filter_on(
 
     Args:
         name: The filter.
-        data: How the scans are read.
+        data: Options for reading scans.
         frames: The scans.
         trials: Trials in all.
         seed: Of the sampler.
-        storage: Where the trials are kept and shared; None keeps nothing.
+        storage: Storage of the trials, shared with other searches; None keeps nothing.
         candidates: Bounds outside which nothing is called rain; None where anything may be.
         threads: Threads of the search for neighbours; 0 takes every core.
 
@@ -102,7 +102,7 @@ def tune_model_on(name: str, data: ScanData, frames: Sequence[Frame], threads: i
 
     Args:
         name: ``default``, or the model's file.
-        data: How the scans are read.
+        data: Options for reading scans.
         frames: The scans.
         threads: Threads to use; 0 takes every core.
 

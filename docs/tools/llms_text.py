@@ -45,7 +45,7 @@ def _pages(entries: list[dict[str, Any]]) -> Iterator[tuple[str, str]]:
 
 
 def _address(page: str) -> str:
-    """Where the site has a page, from its root."""
+    """The address of a page on the site, from its root."""
     if page == "index.md":
         return "./"
     return page.removesuffix("index.md").removesuffix(".md").rstrip("/") + "/"

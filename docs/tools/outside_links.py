@@ -34,5 +34,5 @@ class OutsideLinksExtension(Extension):
 
 
 def makeExtension(**options: object) -> OutsideLinksExtension:  # noqa: N802
-    """Makes the extension, as Python-Markdown asks."""
+    """Makes the extension, for Python-Markdown."""
     return OutsideLinksExtension(**options)

@@ -15,7 +15,7 @@ TREE = REPOSITORY / "build" / "docs"
 
 
 def main() -> None:
-    """Makes the links anew."""
+    """Makes the links again."""
     shutil.rmtree(TREE, ignore_errors=True)
     package = TREE / "derain"
     package.mkdir(parents=True)

@@ -3,8 +3,8 @@
 //     derain_onnx [--threads N] MODEL.onnx OUT SCAN.bin...
 //
 // For each scan, OUT/<stem>.label (uint32 per row, 1 = rain) and OUT/<stem>.bin (the other rows),
-// and a line that says how many points were rain and what the stages took.
-// docs/onnx_contract.md says what happens on the way.
+// and a line with the number of points of rain and the time of each stage.
+// docs/onnx_contract.md specifies the steps.
 
 #include <algorithm>
 #include <cstdint>

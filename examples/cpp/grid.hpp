@@ -35,7 +35,7 @@ struct Grid {
 
   // The pixel that a point falls into, row * columns + column; -1 outside the grid.
   std::int64_t pixel(const float* point) const {
-    // Adding 0 makes zeros positive, whose signs atan2 tells apart.
+    // Adding 0 makes zeros positive, whose signs atan2 distinguishes.
     const double x = point[0] + 0.0;
     const double y = point[1] + 0.0;
     const double z = point[2] + 0.0;

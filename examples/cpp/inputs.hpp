@@ -1,4 +1,4 @@
-// What a network takes: tensors, and what a graph says of them before there is a scan.
+// The inputs of a network: tensors, and their declarations in the graph.
 #pragma once
 
 #include <cstddef>
@@ -26,7 +26,7 @@ struct Input {
   std::size_t bytes;
 };
 
-// A matrix of so many columns on the numbers of a view.
+// A matrix over the numbers of a view, with a given number of columns.
 template <typename Number>
 Input matrix(const char* name, Element element, std::vector<Number>& numbers,
              std::size_t columns) {

@@ -27,7 +27,7 @@ class Network {
 
   const Spec& spec() const { return spec_; }
 
-  // The probability of rain of each of so many cells that a view has.
+  // The probability of rain of each cell of a view.
   std::vector<float> probability(const std::vector<Input>& inputs, std::size_t cells) {
     if (cells == 0) return {};
     const auto logits = run(inputs, cells);
@@ -47,7 +47,7 @@ class Network {
     if (!file || !std::filesystem::is_regular_file(path)) {
       throw InputError(name_, "there is no such file, or it cannot be read", "Check the path.");
     }
-    // From 1.29 on, onnxruntime tells its makers of every model that is opened.
+    // From 1.29 on, onnxruntime reports every model that it opens to its makers.
     environment_.DisableTelemetryEvents();
     const std::string content{std::istreambuf_iterator<char>(file), {}};
     try {

@@ -22,7 +22,7 @@ constexpr float kLargestValue = 1e7F;
 // In every column of a row: a cell of a range image without a return.
 constexpr float kSentinel = -1.0F;
 
-// Where all of so many points have one intensity, it was filled in and not measured.
+// If all of at least this many points have one intensity, it was filled in and not measured.
 constexpr std::size_t kFewestAlike = 100;
 
 constexpr std::size_t kColumns = 4;

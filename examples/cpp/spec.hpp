@@ -1,4 +1,4 @@
-// The Spec of a model, as far as this program uses it: docs/onnx_contract.md says the whole.
+// The Spec of a model, as far as this program uses it: docs/onnx_contract.md has the whole.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace derain {
 
-// The layout of a Spec that is read here, and the most neighbours that it may ask for.
+// The layout of a Spec that is read here, and the most neighbours that it may state.
 constexpr double kSchema = 1;
 constexpr double kMostNeighbours = 64;
 
@@ -48,7 +48,7 @@ struct Spec {
   std::optional<std::vector<Bound>> candidates;
 };
 
-// A model that is one of derain's, and asks for what this program does not know.
+// A model of derain that needs something that this program does not support.
 class Unknown : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -4,12 +4,13 @@ It needs ROS 2 with Python 3.11 or later (Jazzy has 3.12), and derain, installed
 
     python3 derain_node.py --ros-args -p input:=/ouster/points -p output:=/ouster/points/clean
 
-``derain.launch.py`` beside it starts it with parameters; ``docs/robot.md`` says how to install it.
+``derain.launch.py`` beside it starts it with parameters; ``docs/robot.md`` describes the
+installation.
 
 Parameters:
 
 - ``input``, ``output``: topics of ``sensor_msgs/PointCloud2`` (``points``, ``points/clean``).
-- ``removed``: topic for the points that were taken out; empty, as it is by default, for none.
+- ``removed``: topic for the removed points; empty, the default, for none.
 - ``model``: an ONNX file of ``derain export``; empty for the model that comes with derain.
 - ``dry``: a dry scan of the same sensor in the same kind of place, as a file; with it the level
   shows fog that returns nothing too. Empty, as it is by default, for none.
@@ -112,7 +113,7 @@ def rain_to_remove(judgement: Judgement) -> NDArray[np.bool_]:
 
 @dataclass
 class Tally:
-    """What became of the clouds since the last diagnostic.
+    """Counts of the clouds since the last diagnostic.
 
     Attributes:
         clouds: How many were cleaned.
@@ -133,7 +134,7 @@ class Tally:
     level: Level = Level.CLEAR
 
     def add(self, judgement: Judgement, seconds: float, alarm: Alarm) -> None:
-        """Counts a cloud, and tells the alarm of its weather."""
+        """Counts a cloud, and updates the alarm with its weather."""
         weather = judgement.weather
         self.weather += weather
         self.level = alarm.update(weather.visibility, weather.reach)
@@ -150,7 +151,7 @@ class Tally:
 
     @property
     def warning(self) -> str:
-        """What is wrong; empty where nothing is."""
+        """The text of a warning; empty if there is none."""
         if not self.clouds:
             return "no clouds"
         if self.share > MOST_RAIN:
@@ -158,7 +159,7 @@ class Tally:
         return ""
 
     def values(self) -> dict[str, str]:
-        """What a diagnostic says, by name."""
+        """The values of a diagnostic, by name."""
         return {
             "clouds": str(self.clouds),
             "points per cloud": f"{self.points / max(self.clouds, 1):.0f}",
@@ -171,7 +172,7 @@ class Tally:
 
 @dataclass
 class RainRemover:
-    """Judges clouds, and remembers what became of them and what it has told of them."""
+    """Judges clouds, counts the outcomes, and keeps the warnings that it has given."""
 
     derainer: Derainer
     tally: Tally = field(default_factory=Tally)
@@ -179,7 +180,7 @@ class RainRemover:
     alarm: Alarm = field(default_factory=Alarm)
 
     def judge(self, message: Any) -> Judgement:
-        """Says which points of a PointCloud2 are rain, row after row.
+        """Returns the rain of a PointCloud2, row after row.
 
         Raises:
             InputError: A cloud without x, y and z, or scores that are not finite.
@@ -191,13 +192,13 @@ class RainRemover:
         return judgement
 
     def news(self, judgement: Judgement) -> list[str]:
-        """What is odd about a cloud for the model and was not about earlier ones."""
+        """New kinds of warnings about a cloud."""
         odd = [one for one in self.derainer.issues(judgement) if one.kind not in self.told]
         self.told |= {one.kind for one in odd}
         return [one.detail for one in odd]
 
     def tally_so_far(self) -> Tally:
-        """What became of the clouds since it was last asked."""
+        """The counts of the clouds since the last call."""
         tally, self.tally = self.tally, Tally()
         return tally
 
@@ -269,7 +270,7 @@ class DerainNode:
         node.create_timer(DIAGNOSTIC_PERIOD, self.report)
 
     def take(self, message: Any) -> None:
-        """Cleans one cloud. What is wrong with it is logged, and the next one is waited for."""
+        """Cleans one cloud. Errors are logged, and the node goes on."""
         try:
             judgement = self.remover.judge(message)
             rain = rain_to_remove(judgement)

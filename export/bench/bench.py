@@ -49,8 +49,8 @@ class Bench:
 
     Attributes:
         rows: The results of each method, in the order of the methods.
-        facts: What the figures depend on besides the methods, as JSON-able primitives: scans, data
-            card, seed, processor, versions.
+        facts: Facts that the figures depend on besides the methods, as JSON-able primitives: scans,
+            data card, seed, processor, versions.
     """
 
     rows: Sequence[Row]
@@ -93,7 +93,7 @@ class Bench:
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is timed, and the seed.
+    """The amount of timing, and the seed.
 
     Attributes:
         threads: Threads of views and networks; 0 takes every core this process may use.
@@ -149,7 +149,7 @@ def bench(
         train: Labelled scans that ``position`` and ``intensity`` learn from.
         columns: Names of the columns of files that do not name them.
         intensity_scale: Factor from the scans' intensities to the unit of the methods, e.g. 255.
-        distinct: Whether points at one position count once; None follows the card.
+        distinct: True if points at one position count once; None follows the card.
         rain_rates: Rain rate in mm/h by sequence, where it is known.
         threads: Threads of views and networks; 0 takes every core this process may use.
         timed: Scans that each method is timed on, spread evenly.
@@ -167,11 +167,11 @@ def bench(
             one that cannot be read or has no labels. The row of a method that fails states so.
     """
     card = card if isinstance(card, DataCard) else load_card(card)
-    asked = card.deduplicate if distinct is None else distinct
+    deduplicate = card.deduplicate if distinct is None else distinct
 
     def labelled(given: GivenScans) -> LabelledFrames:
         frames = source_of(given, columns)
-        return LabelledFrames(card, frames, intensity_scale, asked, rain_rates or {})
+        return LabelledFrames(card, frames, intensity_scale, deduplicate, rain_rates or {})
 
     learn_from = None if train is None else labelled(train).truths
     rows = bench_entries(methods, learn_from, Runtime(runtime, precision))
@@ -194,8 +194,8 @@ def count_in_units(
         methods: The methods, one or more.
         data: The scans.
         threads: Threads of views and networks of a process; 0 takes every core it may use.
-        folder: Where records are kept, if the division keeps them; None keeps none.
-        division: How the scans are divided into units.
+        folder: Folder of records, if the division keeps them; None keeps none.
+        division: Division of the scans into units.
         executor: Does the units; None does them in this process.
 
     Returns:
@@ -227,9 +227,9 @@ def run_bench(
     Args:
         methods: The methods, one or more.
         data: The scans.
-        effort: How much is timed, and the seed.
+        effort: Amount of timing, and the seed.
         command: The command or call of this bench, for its report.
-        counted: What :func:`count_in_units` returned; None counts now, in this process.
+        counted: A result of :func:`count_in_units`; None counts now, in this process.
 
     Raises:
         InputError: A scan that cannot be read. The row of a method that fails states so.
@@ -308,7 +308,7 @@ class Counting(ValueWork[FrameUnit]):
         methods: The methods.
         threads: Threads of views and networks.
         reader: Reads the scans.
-        distinct: Whether points at one position count once.
+        distinct: True if points at one position count once.
         rain_rates: Rain rate in mm/h by sequence, where it is known.
     """
 
@@ -355,7 +355,7 @@ class Counting(ValueWork[FrameUnit]):
 
 
 def _options(methods: Sequence[BenchEntry], data: LabelledFrames, block: int) -> dict[str, Any]:
-    """What the counts depend on but the scans."""
+    """The options that the counts depend on besides the scans."""
     return {
         **shared_options("bench", data.frames, block),
         **{f"method {method.title}": method.fingerprint for method in methods},

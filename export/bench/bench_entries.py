@@ -1,4 +1,4 @@
-"""What a bench compares: models, filters, and the baselines that every method has to beat.
+"""The entries of a bench: models, filters, and the baselines that every method has to beat.
 
 Nothing here loads torch, so that a process that measures a method's memory holds little else.
 """
@@ -96,7 +96,7 @@ class BenchEntry:
 
     @cached_property
     def is_picklable(self) -> bool:
-        """Whether it can be sent to another process.
+        """True if it can be sent to another process.
 
         Objects that cannot be pickled cannot, nor can those that the user's own script or session
         defines, which no other process can import.
@@ -293,7 +293,7 @@ class TimedFunction:
         return self
 
     def __call__(self, scan: Scan, stopwatch: Stopwatch) -> NDArray[np.bool_]:
-        """Which points are rain, bool (N,).
+        """True for points that are rain, bool (N,).
 
         Raises:
             InputError: The function returns anything but one bool for each point.

@@ -22,7 +22,7 @@ from derain.system.workers import without_main_module, worker_pool
 
 @dataclass(frozen=True)
 class Timing:
-    """How methods are timed.
+    """Options for timing methods.
 
     Attributes:
         frames: Scans to time them on, one or more.
@@ -46,7 +46,7 @@ class Cost:
         peak_memory: Largest resident memory of a process that does this alone, in MiB, Python and
             its libraries included; None where it is not known, or the process did more.
         failure: The error that stopped it, if any; there are no runs then.
-        alone: Whether it was measured in a process of its own.
+        alone: True if it was measured in a process of its own.
     """
 
     times: RunTimes

@@ -18,8 +18,8 @@ from derain.export.timing import STAGES
 from derain.files.atomic import replacing
 
 SIMULATED_IS_EASY = (
-    "**Simulated data.** What falls in a simulation is easier to find than what falls from the "
-    "sky: these figures are no evidence of quality on real scans."
+    "**Simulated data.** Simulated rain is easier to find than real rain: these figures are no "
+    "evidence of quality on real scans."
 )
 
 READING = """\
@@ -28,19 +28,19 @@ READING = """\
 - `-` is a score that is undefined: precision where no point was called rain, recall where none is
   rain, F1 and IoU where neither holds. A mean over scans is over the scans that have the score.
 - `IoU 95 %` is the bootstrap interval over scans, `behind best` that of the difference to the best
-  IoU, on the same draws: one that reaches 0 does not separate the two on these scans. Scans that
-  follow each other are alike, which makes both too narrow.
+  IoU, on the same draws: an interval that reaches 0 shows no significant difference on these
+  scans. Consecutive scans are alike, which makes both too narrow.
 - ms are from file to mask, median and 95th percentile, each method alone in a process of its own
   and no search for neighbours shared. MiB is that process's largest resident memory, Python and its
   libraries included.
-- `position` uses only where rain was in the training scans, `intensity` only that rain is dim and
-  near; `all` and `none` look at nothing. A method that does not beat them has learnt nothing."""
+- `position` uses only the places of rain in the training scans, `intensity` only that rain is dim
+  and near; `all` and `none` use nothing. A method that does not beat them has learnt nothing."""
 
 
 OTHER_RUNTIMES = """\
-Each model by another runtime beside itself by onnxruntime in float32, on the scans that were timed:
-the largest difference of a logit, as a share of the scan's largest where that is above 1; points or
-pixels on the other side of the threshold; what both call rain, as a share of what either does."""
+Each model on another runtime, compared with onnxruntime in float32 on the timed scans: the largest
+difference of a logit, relative to the scan's largest logit if that is above 1; points or pixels on
+the other side of the threshold; and the IoU of the rain that the two find."""
 
 
 def write_report(rows: Sequence[Row], facts: Mapping[str, Any], out: Path) -> None:
@@ -48,7 +48,7 @@ def write_report(rows: Sequence[Row], facts: Mapping[str, Any], out: Path) -> No
 
     Args:
         rows: The rows of the table.
-        facts: What the bench depends on besides its methods, as :class:`.bench.Bench` has it.
+        facts: Facts that the bench depends on besides its methods, as :class:`.bench.Bench` has it.
         out: The folder, made if missing.
 
     Raises:
@@ -97,9 +97,9 @@ def as_markdown(rows: Sequence[Row], facts: Mapping[str, Any]) -> str:
         parts += ["## IoU by sensor", _groups(rows, lambda row: row.scores.by_sensor)]
     parts += ["## Milliseconds by stage, median and 95th percentile", _by_stage(rows)]
     if changed := facts.get("runtimes"):
-        parts += ["## What another runtime changes", runtimes_table(changed), OTHER_RUNTIMES]
+        parts += ["## Other runtimes", runtimes_table(changed), OTHER_RUNTIMES]
     if failures := _failures(rows):
-        parts += ["## What failed", failures]
+        parts += ["## Failures", failures]
     return "\n\n".join([*parts, facts["versions"]])
 
 
@@ -136,7 +136,7 @@ def draw_speed_error(rows: Sequence[Row], facts: Mapping[str, Any], path: Path) 
 
     Args:
         rows: The rows of the table.
-        facts: What the bench depends on besides its methods, as :class:`.bench.Bench` has it.
+        facts: Facts that the bench depends on besides its methods, as :class:`.bench.Bench` has it.
         path: PNG file to write.
 
     Raises:

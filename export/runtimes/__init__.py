@@ -1,4 +1,4 @@
-"""What runs an exported network: a runtime a file, by name.
+"""Runtimes of exported networks, one module each, by name.
 
 A file of this folder enters by ``@RUNTIMES.add("its name")``, and needs to be named nowhere else:
 :class:`.session.Session` describes what it brings with it. None imports its library before a model

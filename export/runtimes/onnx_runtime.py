@@ -46,12 +46,12 @@ class OnnxRuntimeSession(Session):
 
     @property
     def inputs(self) -> dict[str, TensorType]:
-        """What the network takes, by name."""
+        """Inputs of the network, by name."""
         return {value.name: _type_of(value) for value in self.session.get_inputs()}
 
     @property
     def outputs(self) -> list[TensorType]:
-        """What the network gives, in order."""
+        """Outputs of the network, in order."""
         return [_type_of(value) for value in self.session.get_outputs()]
 
     def run(self, inputs: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:

@@ -44,7 +44,7 @@ class OpenVinoSession(Session):
         if capability not in core.get_property(DEVICE, "OPTIMIZATION_CAPABILITIES"):
             raise InputError(
                 f"precision {precision}",
-                "this processor has none, and to imitate it takes longer than float32",
+                "this processor has none, and emulating it is slower than float32",
                 "Leave it out, or take a processor with AVX-512 BF16 or AMX.",
             )
         options = {
@@ -70,12 +70,12 @@ class OpenVinoSession(Session):
 
     @property
     def inputs(self) -> dict[str, TensorType]:
-        """What the network takes, by name."""
+        """Inputs of the network, by name."""
         return {port.get_any_name(): _type_of(port) for port in self.model.inputs}
 
     @property
     def outputs(self) -> list[TensorType]:
-        """What the network gives, in order."""
+        """Outputs of the network, in order."""
         return [_type_of(port) for port in self.model.outputs]
 
     def run(self, inputs: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:

@@ -23,7 +23,7 @@ DEFAULT_RUNTIME, FLOAT32_PRECISION = "onnxruntime", "float32"
 
 @dataclass(frozen=True)
 class TensorType:
-    """What a network takes or gives under one name.
+    """An input or output of a network: its type and shape.
 
     Attributes:
         dtype: NumPy's name of the type of its numbers.
@@ -51,8 +51,8 @@ class Session(ABC):
     Attributes:
         NAME: The runtime's name; the decorator sets it.
         PACKAGE: The package that it is installed by, whose version a report of times states.
-        PRECISIONS: What it can compute in, on some processors at least.
-        DROPS_UNUSED_INPUTS: Whether ``inputs`` leaves out what the network has no use for.
+        PRECISIONS: Supported precisions, on some processors at least.
+        DROPS_UNUSED_INPUTS: True if ``inputs`` leaves out what the network has no use for.
 
     Raises:
         InputError: A runtime that is not installed, a graph that it cannot run, or a precision that
@@ -70,12 +70,12 @@ class Session(ABC):
     @property
     @abstractmethod
     def inputs(self) -> dict[str, TensorType]:
-        """What the network takes, by name."""
+        """Inputs of the network, by name."""
 
     @property
     @abstractmethod
     def outputs(self) -> list[TensorType]:
-        """What the network gives, in order."""
+        """Outputs of the network, in order."""
 
     @abstractmethod
     def run(self, inputs: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
@@ -90,7 +90,7 @@ class Session(ABC):
 
     @classmethod
     def cannot_run(cls, file: ModelFile, error: Exception) -> InputError:
-        """What to raise of a graph that the runtime does not take."""
+        """The error for a graph that the runtime does not accept."""
         lines = [line for line in str(error).splitlines() if line.strip()]
         # OpenVINO begins with lines on the place in its own sources where it stopped.
         reason = next((line for line in lines if not line.startswith("Exception from")), "")
@@ -103,7 +103,7 @@ class Session(ABC):
 
 @dataclass(frozen=True)
 class Runtime:
-    """What runs a network, and the precision that it computes in.
+    """A runtime of networks, and the precision that it computes in.
 
     Attributes:
         name: One of ``RUNTIMES``.
@@ -143,7 +143,7 @@ class Runtime:
 
     @property
     def is_default(self) -> bool:
-        """Whether it is what runs models where nobody asks for another."""
+        """True if it runs models by default."""
         return self == Runtime()
 
     def __str__(self) -> str:

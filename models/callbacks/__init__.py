@@ -1,1 +1,1 @@
-"""What happens beside training: checkpoints, pictures, reports and label files."""
+"""Callbacks of training: checkpoints, pictures, reports and label files."""

@@ -1,4 +1,4 @@
-"""The best checkpoint of a training run, which a run that goes on takes along."""
+"""The best checkpoint of a training run, which a resumed run takes along."""
 
 import os
 import re
@@ -22,7 +22,7 @@ from derain.system.notices import warn
 
 
 class BestCheckpoint(ModelCheckpoint):
-    """Keeps the best epochs, also of a run that goes on in a folder of its own.
+    """Keeps the best epochs, also of a run resumed in a folder of its own.
 
     Lightning forgets what was best when the folder changes, and calls the first epoch there the
     best, however poor. This one goes on with the scores and with copies of the files; those of the
@@ -50,7 +50,7 @@ class BestCheckpoint(ModelCheckpoint):
 
     @property
     def state_key(self) -> str:
-        """Where checkpoints keep the state: as Lightning's, for a run may go on from its own."""
+        """The key of its state in checkpoints: Lightning's, so that old runs can be resumed."""
         return super().state_key.replace(type(self).__qualname__, ModelCheckpoint.__qualname__, 1)
 
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:

@@ -20,7 +20,7 @@ class FiniteLoss(lightning.Callback):
     _sum: Tensor | None = None  # of the losses since the last check
 
     def on_train_start(self, trainer: lightning.Trainer, pl_module: Any) -> None:
-        """Begins anew."""
+        """Resets the check."""
         self._sum = torch.zeros((), device=trainer.strategy.root_device)
 
     def on_train_batch_end(

@@ -1,4 +1,4 @@
-"""What TensorBoard shows of a training: pictures of scans and of errors, and a page of charts."""
+"""TensorBoard's view of a training: pictures of scans and of errors, and a page of charts."""
 
 from typing import Any
 
@@ -50,7 +50,7 @@ class DrawnEpochs:
     validations as the one before it. Of an epoch with several validations, the first is drawn.
 
     Args:
-        pictures: How many epochs are drawn in a training whose length is known.
+        pictures: Number of epochs that are drawn in a training whose length is known.
     """
 
     def __init__(self, pictures: int) -> None:
@@ -58,7 +58,7 @@ class DrawnEpochs:
         self.last: int | None = None
 
     def begins(self, trainer: lightning.Trainer) -> bool:
-        """Whether what is measured now is drawn; called once, when a validation or test begins."""
+        """True if what is measured now is drawn; called once, when a validation or test begins."""
         if trainer.sanity_checking or not self.pictures:
             return False
         if trainer.state.fn != TrainerFn.FITTING:
@@ -86,8 +86,8 @@ class ScanPanels(lightning.Callback):
     pictures. So ten of the epochs are drawn, chosen by :class:`DrawnEpochs`.
 
     Args:
-        scans: How many scans to show; 0 shows none.
-        pictures: How many pictures of each to draw in a training.
+        scans: Number of scans to show; 0 shows none.
+        pictures: Number of pictures of each to draw in a training.
     """
 
     def __init__(self, scans: int = 2, pictures: int = 10) -> None:
@@ -96,7 +96,7 @@ class ScanPanels(lightning.Callback):
         self.left = 0
 
     def on_validation_epoch_start(self, trainer: lightning.Trainer, *_: Any) -> None:
-        """Starts counting anew; the order of validation scans is fixed."""
+        """Restarts counting; the order of validation scans is fixed."""
         draws = self.epochs.begins(trainer) and trainer.is_global_zero
         self.left = self.scans if draws else 0
 
@@ -209,7 +209,7 @@ def errors_by_name(measured: RainCounts) -> dict[str, float]:
 
 
 def _of_curve(points: OperatingPoints) -> tuple[NDArray[np.float64] | NDArray[np.int64], ...]:
-    """What TensorBoard wants of a curve, at thresholds from 0 to 1 in equal steps."""
+    """A curve in TensorBoard's form, at thresholds from 0 to 1 in equal steps."""
     even = points.among(CURVE_THRESHOLDS)
     hits, false = even.true_positive, even.false_positive
     negatives, misses = points.other - false, points.rain - hits

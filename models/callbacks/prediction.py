@@ -22,7 +22,7 @@ class PredictionWriter(BasePredictionWriter):
     """Writes ``.label`` files (1 for rain, one per row of the scan) into a folder.
 
     Args:
-        folder: Where to write; the scans' own folders are repeated below it.
+        folder: Folder to write to; the scans' own folders are repeated below it.
     """
 
     def __init__(self, folder: str = "predictions") -> None:

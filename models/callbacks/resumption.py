@@ -1,4 +1,4 @@
-"""What a run takes over from the checkpoint that it goes on from: states like its own."""
+"""The states that a resumed run takes over from its checkpoint: those that match its own."""
 
 import math
 from collections.abc import Mapping
@@ -103,12 +103,12 @@ def _state_after_a_step(optimizer: Optimizer) -> dict[str, Any]:
 
 
 def matching_state(found: Entry, own: Any) -> Any:
-    """What a checkpoint has in place of a state, reduced to what that state has.
+    """A state from a checkpoint, reduced to the entries of the run's own state.
 
     Lightning and torch enter whatever a checkpoint holds into their own objects.
 
     Args:
-        found: What stands in the checkpoint. It is not trusted.
+        found: The state in the checkpoint. It is not trusted.
         own: The state of the same object before it is restored.
 
     Returns:

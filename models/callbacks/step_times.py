@@ -1,4 +1,4 @@
-"""How fast a training is, and what its steps spend their time on, in TensorBoard."""
+"""The speed of a training, and the time of the parts of its steps, in TensorBoard."""
 
 import time
 from typing import Any
@@ -29,7 +29,7 @@ class StepTimes(lightning.Callback):
     _spent: dict[str, float]  # milliseconds of the steps since the last log
 
     def on_train_start(self, *_: Any) -> None:
-        """Begins anew."""
+        """Resets the timing."""
         self._begin()
         self._started = False
 
@@ -38,7 +38,7 @@ class StepTimes(lightning.Callback):
         self._waits_since: float | None = time.perf_counter()
 
     def on_validation_start(self, *_: Any) -> None:
-        """What follows in this epoch is no waiting for a batch."""
+        """Stops timing: the rest of this epoch does not wait for a batch."""
         self._waits_since = None
 
     def on_train_batch_start(

@@ -52,7 +52,7 @@ class Geometry(nn.Module):
         neighbours: k, the size of a neighbourhood, the point itself included.
         width: Features of a point.
         of_neighbour: Features of each neighbour, of where it is.
-        opinion: What a point tells those that it is a neighbour of.
+        opinion: Features that a point passes to the points that it is a neighbour of.
         context: Features of a shell around the sensor.
     """
 
@@ -105,7 +105,7 @@ class Geometry(nn.Module):
         return features, self.head(features)[0]
 
     def _context(self, features: Tensor, far: Tensor, points: Tensor) -> Tensor:
-        """What the scan holds at the range of each point, and in all, over all of its points.
+        """Counts of the scan at the range of each point, and in total, over all of its points.
 
         Args:
             features: Of isolated points, float (width, S).
@@ -128,14 +128,14 @@ class Geometry(nn.Module):
         return result + self.from_scan(of_scan)[:, None]
 
     def _shares(self, far: Tensor) -> Tensor:
-        """How much each logarithm of range belongs to each centre, float (centres, S)."""
+        """Share of each logarithm of range that belongs to each centre, float (centres, S)."""
         return torch.softmax(-(((far - self.centres) / SHELL_REACH) ** 2), dim=0)
 
 
 def in_steps(
     points: Tensor, distances: Tensor, neighbours: Tensor, step: Tensor
 ) -> tuple[Tensor, Tensor]:
-    """Where each point's neighbours are, along its beam and across it.
+    """Positions of each point's neighbours, along its beam and across it.
 
     A step is the angle between neighbouring beams, the angular resolution of the sensor. In metres
     it is that angle times the range of the point.

@@ -1,4 +1,4 @@
-"""Cues: what geometry and brightness each know of a point, weighed by one fusion."""
+"""Cues: evidence of rain from geometry and from brightness, weighed by one fusion."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any, ClassVar
@@ -41,17 +41,17 @@ class CueFusion(SupervisedModule):
         neighbours: k, the size of a neighbourhood, the point itself included; at least 9.
         width: Features of a point.
         of_neighbour: Features of each neighbour, of where it is.
-        opinion: What a point tells those that it is a neighbour of.
+        opinion: Number of features that a point passes to those that it is a neighbour of.
         context: Features of what a scan holds at some range.
         fusion: Features of a point in the layers that weigh the cues.
         without_intensity: Added to the log-odds of scans without intensities; chosen after the
             training.
         learning_rate: Of AdamW, where it is highest.
         weight_decay: Of AdamW.
-        final_share: How much of the learning rate is left at the end; above 0 where weights are
+        final_share: Share of the learning rate at the end; above 0 where weights are
             averaged over the last part of the training.
         threshold: A point is rain where its probability is greater.
-        balance: How far the rarer class counts for more: 0 not at all, so that a point wrongly
+        balance: Extra weight of the rarer class: 0 not at all, so that a point wrongly
             called rain counts for no less than one that is missed; 1 by the inverse of its share.
         spec: Set by derain when it saves a checkpoint; leave it out otherwise.
 
@@ -94,7 +94,7 @@ class CueFusion(SupervisedModule):
         return IsolatedPointView(self.hparams["neighbours"])
 
     def accepts_view(self, view: View) -> bool:
-        """Whether the network can take what a Spec's view gives: as many neighbours."""
+        """True if the network can take what a Spec's view gives: as many neighbours."""
         return isinstance(view, IsolatedPointView) and view.neighbours == self.hparams["neighbours"]
 
     def forward(self, **inputs: Tensor) -> Tensor:
@@ -134,7 +134,7 @@ class CueFusion(SupervisedModule):
 
 
 def _scans_of(batch: Batch) -> Iterator[dict[str, Tensor]]:
-    """What the network takes of each scan of a batch; all of them share the points."""
+    """Splits a batch into the network's inputs for each scan; all of them share the points."""
     shared = {name: batch.inputs[name] for name in ("points", "cell")}
     split = {name: batch.split(batch.inputs[name]) for name in ("distances", "neighbours")}
     for scan in range(len(batch.cells)):

@@ -68,7 +68,7 @@ class CueNetwork(nn.Module):
         neighbours: k, the size of a neighbourhood, the point itself included; at least 9.
         width: Features of a point.
         of_neighbour: Features of each neighbour, of where it is.
-        opinion: What a point tells those that it is a neighbour of.
+        opinion: Features that a point passes to the points that it is a neighbour of.
         context: Features of what a scan holds at some range.
         fusion: Features of a point in the two hidden layers of a fusion.
         without_intensity: Added to the log-odds of a scan whose intensities are not known or all
@@ -169,7 +169,7 @@ def _fusion(given: int, width: int) -> nn.Module:
 
 
 class Cues:
-    """What is known of a scan's points of which geometry leaves doubt, and of their neighbours.
+    """Cues of the points that geometry leaves in doubt, and of their neighbours.
 
     Args:
         far: Logarithms of the ranges of S isolated points, float (S,).
@@ -246,7 +246,7 @@ class Cues:
 
 @dataclass(frozen=True)
 class Brightness:
-    """What intensities mean in one scan.
+    """The calibration of intensities in one scan.
 
     Attributes:
         log_odds: Log-odds of rain by shell and rank of intensity, 0 where that means nothing, float
@@ -264,7 +264,7 @@ class Brightness:
 
 
 def calibrated(counts: Tensor, cell: Tensor, probability: Tensor) -> Brightness:
-    """What intensities mean, by points that may be rain; the others are taken not to be.
+    """Calibrates intensities by points that may be rain; all others are assumed not to be.
 
     How bright rain is depends on the sensor, and no training shows it. The scan does: where most of
     its points are judged well without intensity, histograms over them show how bright rain is here,
@@ -273,7 +273,7 @@ def calibrated(counts: Tensor, cell: Tensor, probability: Tensor) -> Brightness:
     Args:
         counts: Points of the scan by shell and rank, float (SHELLS, INTENSITY_RANKS).
         cell: Shell and rank of those that may be rain, int64 (S,).
-        probability: How probably each is, float (S,).
+        probability: Their probabilities of rain, float (S,).
     """
     # In float64, for sums of float32 over a whole scan differ from one runtime to another.
     rain = counts.new_zeros(counts.numel(), dtype=torch.float64)

@@ -1,4 +1,4 @@
-"""How networks see past the edges of an image: padded to a size that halves, or continued."""
+"""Padding of images for networks: to a size that halves evenly, or continued past the edges."""
 
 from collections.abc import Callable
 from typing import Any
@@ -16,8 +16,8 @@ def pad_to_multiple(image: Tensor, multiple: int, value: float) -> Tensor:
 
     Args:
         image: Image, (B, channels, H, W).
-        multiple: What both sides shall be multiples of, in pixels.
-        value: What the new pixels hold, in every channel.
+        multiple: Divisor of both sides, in pixels.
+        value: Value of the new pixels, in every channel.
 
     Returns:
         Image of the same dtype, (B, channels, ≥ H, ≥ W).
@@ -97,6 +97,6 @@ def _folded(gradient: Tensor, dim: int, margin: int, source: Callable[[int], int
 
 
 def _mirrored(row: int, height: int) -> int:
-    """Row of the image that stands for one beyond its edges."""
+    """Row of the image that replaces one beyond its edges."""
     period = max(2 * (height - 1), 1)
     return min(row % period, -row % period)

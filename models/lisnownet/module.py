@@ -46,7 +46,7 @@ class DeployedLiSnowNet(nn.Module):
 
     Args:
         network: A trained network.
-        rule: What it calls rain.
+        rule: Its rule of rain.
     """
 
     def __init__(self, network: LiSnowNetwork, rule: SelectionRule) -> None:
@@ -76,7 +76,7 @@ class LiSnowNet(DerainingModule, Published):
             nearer one get a score: ``nearest range``, ``copy`` or ``vote``.
         width: Channels of the features at full size, 8 as published.
         dropout: Share of feature maps dropped in training.
-        alpha: How much sparsity counts against the residual: it weighs 1 - 2^-alpha.
+        alpha: Weight of sparsity against the residual: it weighs 1 - 2^-alpha.
         beta: Share of the wavelet part in sparsity.
         norm: Norm of the residual: ``l1`` as published, or ``l2``.
         learning_rate: Of Adam.
@@ -125,7 +125,7 @@ class LiSnowNet(DerainingModule, Published):
                 "Give an alpha of at least 0 and a beta from 0 to 1.",
             )
         if norm not in RESIDUALS:
-            raise InputError(self.NAME, f"no such norm: '{norm}'", "Known are l1 and l2.")
+            raise InputError(self.NAME, f"no such norm: '{norm}'", "Available: l1 and l2.")
         self.save_hyperparameters()
         self.network = LiSnowNetwork(width=width, dropout=dropout)
         self.selection = SelectionRule.fitted(rule, [])
@@ -146,8 +146,8 @@ class LiSnowNet(DerainingModule, Published):
         if network.channels != 2:
             raise InputError(
                 cls.NAME,
-                f"the weights see {network.channels} channels",
-                "Give weights that see range and intensity.",
+                f"the weights are for {network.channels} channels",
+                "Give weights for range and intensity.",
             )
         model = cls(grid=require_grid(grid, cls.NAME), width=network.width)
         model.network = network
@@ -225,13 +225,13 @@ class LiSnowNet(DerainingModule, Published):
         self.adopt(replace(self.spec, rule=rule.as_dict()))
 
     def _image_of(self, scan: Scan) -> tuple[Tensor, Tensor]:
-        """What :meth:`forward` takes of a scan."""
+        """The input of :meth:`forward` for a scan."""
         inputs = self.spec.make_view()(scan).inputs()
         image, valid = (torch.from_numpy(inputs[name]) for name in ("image", "valid"))
         return image.to(self.device), valid.to(self.device)
 
     def _changes(self, image: Tensor, valid: Tensor) -> NDArray[np.float32]:
-        """What the network changes of the returns that the rule's limits leave, float32 (M,)."""
+        """Changes by the network at the returns within the rule's limits, float32 (M,)."""
         seen = cube_roots(image, self.selection)
         changes = denoising_change(seen, self.network(seen, valid))
         return changes[valid & may_be_rain(image, self.selection)].cpu().numpy()

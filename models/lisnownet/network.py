@@ -163,7 +163,7 @@ class LiSnowNetwork(nn.Module):
         Args:
             image: Cube roots of range in metres and of intensity in 0..1, float (B, 2, H, W). What
                 empty pixels hold does not matter.
-            valid: Which pixels hold a return, bool (B, 1, H, W).
+            valid: True for pixels with a return, bool (B, 1, H, W).
 
         Returns:
             The image as it would be without snow or rain, in the same units, a value in every
@@ -187,7 +187,7 @@ class LiSnowNetwork(nn.Module):
 
 
 def varies(image: Tensor) -> Tensor:
-    """Which images are more than one value throughout, as far as bfloat16 can tell.
+    """True for images that are more than one value throughout, as far as bfloat16 can tell.
 
     Others teach nothing: where nothing varies, each BatchNorm divides by the root of its ε alone,
     which multiplies the gradient by 300, layer after layer, beyond all numbers.
@@ -204,7 +204,7 @@ def varies(image: Tensor) -> Tensor:
 
 
 def published_key(name: str) -> str:
-    """Where one of our parameters stands in the published state_dict."""
+    """The key of one of our parameters in the published state_dict."""
     for ours, published in PUBLISHED_WORDS.items():
         name = name.replace(ours, published)
     return name
@@ -266,7 +266,7 @@ def fill_holes(image: Tensor, valid: Tensor) -> Tensor:
 
     Args:
         image: float (B, channels, H, W). Values where nothing is valid are never looked at.
-        valid: Which pixels hold a return, bool (B, 1, H, W).
+        valid: True for pixels with a return, bool (B, 1, H, W).
 
     Returns:
         float32 or wider, (B, channels, H, W).

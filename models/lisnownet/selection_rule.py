@@ -1,4 +1,4 @@
-"""Which returns LiSnowNet calls rain: a threshold on what denoising changed, and three limits."""
+"""LiSnowNet's selection of rain: a threshold on the change by denoising, and three limits."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
@@ -120,14 +120,14 @@ class SelectionRule:
         """
         names = [field.name for field in fields(cls)]
         if unknown := sorted(set(stated) - set(names)):
-            raise InputError("rule", f"{unknown} are no constants of it", f"Known are {names}.")
+            raise InputError("rule", f"{unknown} are no constants of it", f"Available: {names}.")
         measured = {"full_scale": full_scale(scans), "ground": _road(scans) + ABOVE_ROAD}
         known = {name: value for name, value in measured.items() if np.isfinite(value)}
         return cls(**{**known, **stated})
 
 
 def cube_roots(image: Tensor, rule: SelectionRule) -> Tensor:
-    """What the network sees: cube roots of range and of intensity, in 0..1, float (B, 2, H, W).
+    """The input of the network: cube roots of range and of intensity, in 0..1, float (B, 2, H, W).
 
     Args:
         image: Range (m), z (m) and intensity (the data's unit), float (B, 3, H, W).
@@ -148,8 +148,8 @@ def rain_logits(
     Args:
         image: Range (m), z (m) and intensity (the data's unit), float (B, 3, H, W).
         valid: Pixels with a return, bool (B, 1, H, W).
-        seen: What the network saw, float (B, 2, H, W).
-        denoised: What it made of that, float (B, 2, H, W).
+        seen: Input of the network, float (B, 2, H, W).
+        denoised: Output of the network, float (B, 2, H, W).
         rule: The rule.
     """
     excess = denoising_change(seen, denoised) / rule.residual - 1
@@ -161,13 +161,13 @@ def rain_logits(
 
 
 def denoising_change(seen: Tensor, denoised: Tensor) -> Tensor:
-    """What denoising changed: of range, times that of intensity cubed, float (B, 1, H, W)."""
+    """The change by denoising: of range, times that of intensity cubed, float (B, 1, H, W)."""
     of_range, of_intensity = (denoised - seen).split(1, dim=1)
     return of_range * of_intensity**3
 
 
 def may_be_rain(image: Tensor, rule: SelectionRule) -> Tensor:
-    """Which pixels may be rain by their height and intensity, bool (B, 1, H, W)."""
+    """True for pixels that may be rain by their height and intensity, bool (B, 1, H, W)."""
     _, height, intensity = image.split(1, dim=1)
     return (height > rule.ground) & (intensity < rule.intensity * rule.full_scale)
 

@@ -1,4 +1,4 @@
-"""What LiSnowNet learns from, without a label: the image shall be sparse, and close to the input.
+"""LiSnowNet's loss, without labels: the image becomes sparse, and stays close to the input.
 
 A range image without snow or rain has few details, so few of its wavelet and Fourier coefficients
 differ from 0. All is computed in float32 or wider, and values and gradients are finite for every
@@ -33,15 +33,15 @@ class SparsityLoss(NamedTuple):
 def sparsity_loss(
     denoised: Tensor, image: Tensor, valid: Tensor, alpha: float, beta: float, norm: str = "l1"
 ) -> SparsityLoss:
-    """How far denoised images are from sparse ones, and from the images they were made of.
+    """Distance of denoised images from sparse ones, and from their inputs.
 
     With w = 1 - 2^-alpha the total is w (beta wavelet + (1 - beta) fourier) + (1 - w) residual.
 
     Args:
-        denoised: What the network made of the images, float (B, C, H, W), any size.
+        denoised: Output of the network for the images, float (B, C, H, W), any size.
         image: The images, float (B, C, H, W); what empty pixels hold does not matter.
-        valid: Which pixels hold a return, bool (B, 1, H, W).
-        alpha: How much sparsity counts against the residual, at least 0.
+        valid: True for pixels with a return, bool (B, 1, H, W).
+        alpha: Weight of sparsity against the residual, at least 0.
         beta: Share of the wavelet part in sparsity, 0 to 1.
         norm: Norm of the residual, one of ``RESIDUALS``.
     """
@@ -94,7 +94,7 @@ def wavelet_sparsity(image: Tensor) -> Tensor:
 
 
 def wavelet_levels(height: int, width: int) -> int:
-    """How often :func:`wavelet_sparsity` halves an image."""
+    """Number of times that :func:`wavelet_sparsity` halves an image."""
     published = max(height.bit_length() - 3, 0)
     return min(published, _times_even(height), _times_even(width))
 
@@ -123,5 +123,5 @@ def mean_residual(denoised: Tensor, image: Tensor, valid: Tensor, norm: str = "l
 
 
 def _times_even(number: int) -> int:
-    """How often a positive number can be halved evenly."""
+    """Number of times that a positive number can be halved evenly."""
     return (number & -number).bit_length() - 1

@@ -37,7 +37,7 @@ class OutDet(SupervisedModule, Published):
 
     Args:
         neighbours: k, the size of a neighbourhood, the point itself included.
-        channels: What it sees of a point besides distances: ``x``, ``y``, ``z``, ``range``,
+        channels: Input channels besides distances: ``x``, ``y``, ``z``, ``range``,
             ``intensity``, ``radar``, or other columns of the scans, such as ``doppler``.
         learning_rate: Of Adam.
         weight_decay: Of Adam.
@@ -47,7 +47,7 @@ class OutDet(SupervisedModule, Published):
         candidates: Share of the training scans' rain that must lie within a few bounds (range,
             height, intensity), outside which no point is judged, nor is any rain, such as 0.999.
             As published, None: all are judged.
-        balance: How far the rarer class counts for more: 1 by the inverse of its share, as
+        balance: Extra weight of the rarer class: 1 by the inverse of its share, as
             published; 0 not at all, as suits labels with errors, whose few points called rain by
             mistake would count for many.
         spec: Set by derain when it saves a checkpoint; leave it out otherwise.
@@ -101,7 +101,7 @@ class OutDet(SupervisedModule, Published):
         return NeighbourView(self.hparams["neighbours"], self.channels)
 
     def accepts_view(self, view: View) -> bool:
-        """Whether the network can take what a Spec's view gives: as many neighbours as it has."""
+        """True if the network can take what a Spec's view gives: as many neighbours as it has."""
         return isinstance(view, NeighbourView) and view.neighbours == self.hparams["neighbours"]
 
     def forward(

@@ -1,4 +1,4 @@
-"""3D-OutDet made relative: it sees nothing that differs between sensors.
+"""3D-OutDet with relative inputs, none of which differs between sensors.
 
 3D-OutDet is given places and intensities, by which it knows the sensor that it was trained on, and
 on another one it finds nothing. This variant of our own is given where neighbours are, in steps of
@@ -42,12 +42,12 @@ class RelativeOutDet(SupervisedModule):
         neighbours: k, the size of a neighbourhood, the point itself included; at least 4.
         width: Features of a point.
         of_neighbour: Features of each neighbour, of where it is.
-        opinion: What a point tells those that it is a neighbour of.
+        opinion: Features that a point passes to the points that it is a neighbour of.
         context: Features of what a scan holds at some range; 0 leaves that out.
         learning_rate: Of AdamW, where it is highest.
         weight_decay: Of AdamW.
         threshold: A point is rain where its probability is greater.
-        balance: How far the rarer class counts for more: 0 not at all, so that a point wrongly
+        balance: Extra weight of the rarer class: 0 not at all, so that a point wrongly
             called rain counts for no less than one that is missed; 1 by the inverse of its share.
         spec: Set by derain when it saves a checkpoint; leave it out otherwise.
     """
@@ -83,7 +83,7 @@ class RelativeOutDet(SupervisedModule):
         return NeighbourView(self.hparams["neighbours"], self.channels)
 
     def accepts_view(self, view: View) -> bool:
-        """Whether the network can take what a Spec's view gives: all points, and its neighbours."""
+        """True if the network can take what a Spec's view gives: all points, and its neighbours."""
         return (
             isinstance(view, NeighbourView)
             and view.neighbours == self.hparams["neighbours"]

@@ -55,7 +55,7 @@ class RelativeOutDetNetwork(nn.Module):
         neighbours: k, the size of a neighbourhood, the point itself included.
         width: Features of a point.
         of_neighbour: Features of each neighbour, of where it is.
-        opinion: What a point tells those that it is a neighbour of.
+        opinion: Features that a point passes to the points that it is a neighbour of.
         context: Features of a shell; 0 leaves the rest of the scan out.
     """
 
@@ -103,7 +103,7 @@ class RelativeOutDetNetwork(nn.Module):
     def rain_and_range(
         self, points: Tensor, distances: Tensor, neighbours: Tensor
     ) -> tuple[Tensor, Tensor]:
-        """What :meth:`forward` is made of; arguments are the same.
+        """The parts of :meth:`forward`; arguments are the same.
 
         Returns:
             Logits of rain, before what is likely of the carrier is taken back, float (M,); and
@@ -119,7 +119,7 @@ class RelativeOutDetNetwork(nn.Module):
         return self.head(features)[:, 0], far
 
     def _context(self, features: Tensor, far: Tensor) -> Tensor:
-        """What the scan holds at the range of each point, and in all."""
+        """Counts of the scan at the range of each point, and in total."""
         share = torch.softmax(-(((far[:, None] - self.centres) / SHELL_REACH) ** 2), dim=1)
         context = active(self.to_context(features))
         # In float64, for sums of float32 over a whole scan differ from one runtime to another, and
@@ -141,7 +141,7 @@ def _of_both(layer: nn.Linear, first: Tensor, second: Tensor) -> Tensor:
 
 
 def in_steps(points: Tensor, distances: Tensor, neighbours: Tensor) -> tuple[Tensor, Tensor]:
-    """Where each point's neighbours are, along its beam and across it.
+    """Positions of each point's neighbours, along its beam and across it.
 
     A step is the angle between neighbouring beams, the angular resolution of the sensor. It is
     taken from the scan itself: the median over its points of the angle to the third nearest among

@@ -64,7 +64,7 @@ class SalsaNextModule(SupervisedModule):
             one, or its bounds.
         back_projection: Name of the back-projection, by which points that lost their pixel to a
             nearer one get a score: ``nearest range``, ``copy`` or ``vote``.
-        channels: What it sees of a point: ``range``, ``x``, ``y``, ``z``, ``intensity``, ``radar``,
+        channels: Input channels: ``range``, ``x``, ``y``, ``z``, ``intensity``, ``radar``,
             or other columns of the scans, such as ``doppler``.
         width: Channels of the first layers, 32 as published; all others are multiples of it.
         dropout: Share of feature maps dropped in training.
@@ -74,11 +74,11 @@ class SalsaNextModule(SupervisedModule):
         warm_up: Epochs in which the learning rate rises from 0.
         decay: Factor by which it falls per epoch after that, a little at every step.
         published_loss: Train as published: empty pixels count as background, and the Lovász loss
-            sees rain pixels only, so that it knows no false positive.
+            sees rain pixels only, so that it has no false positives.
         threshold: A point is rain where its probability is greater.
         candidates: Share of the training scans' rain that must lie within a few bounds (range,
             height, intensity), outside which nothing is learnt from or called rain; None for none.
-        balance: How far the rarer class counts for more: 1 by the inverse of its share, as
+        balance: Extra weight of the rarer class: 1 by the inverse of its share, as
             published; 0 not at all, as suits labels with errors, whose few points called rain by
             mistake would count for many.
         spec: Set by derain when it saves a checkpoint; leave it out otherwise.
@@ -202,8 +202,8 @@ class SalsaNext(SalsaNextModule, Published):
         if (network.channels, network.classes) != (len(cls.CHANNELS), 2):
             raise InputError(
                 cls.NAME,
-                f"the weights tell {network.classes} classes from {network.channels} channels",
-                f"Give weights that tell rain from the rest, from {', '.join(cls.CHANNELS)}.",
+                f"the weights are for {network.classes} classes and {network.channels} channels",
+                f"Give weights for two classes, rain and the rest, from {', '.join(cls.CHANNELS)}.",
             )
         model = cls(grid=require_grid(grid, cls.NAME), width=network.width)
         model.network = network

@@ -27,7 +27,7 @@ SLOPE = 0.01
 
 
 def _published_modules() -> dict[str, str]:
-    """Where each of our convolutions and BatchNorms stands in the published network."""
+    """The place of each of our convolutions and BatchNorms in the published network."""
     blocks = {"context.0": "downCntx", "context.1": "downCntx2", "context.2": "downCntx3"}
     blocks |= {f"encoder.{level}": f"resBlock{level + 1}" for level in range(4)}
     blocks |= {"bottleneck.0": "resBlock5"}
@@ -56,7 +56,7 @@ PUBLISHED_KEYS = {
 
 
 class SalsaNextPlan(nn.Module):
-    """How features go from block to block, whatever the blocks are made of.
+    """The path of features from block to block, for any kind of blocks.
 
     Args:
         channels: Number of input channels.

@@ -146,7 +146,7 @@ def test_a_damaged_attachment_is_told(tmp_path: Path) -> None:
         (stating(10**15), "messages are stated in"),
         (chunks_times(50), "more than once"),
         (renamed(POINTS, "/other"), "defines channel . in two ways"),
-        (without_a_chunk, "other chunks than there are"),
+        (without_a_chunk, "does not match its chunks"),
     ],
 )
 def test_a_summary_that_differs_from_the_data_is_refused(
@@ -186,9 +186,9 @@ def add_private(writer: Any) -> None:
 @pytest.mark.parametrize(
     ("kind", "extra", "reason"),
     [
-        ("zstd", add_stray, "channel 99, which nothing defines"),
-        ("not chunked", add_stray, "channel 99, which nothing defines"),
-        ("no summary", add_stray, "channel 99, which nothing defines"),
+        ("zstd", add_stray, "channel 99, which is not defined"),
+        ("not chunked", add_stray, "channel 99, which is not defined"),
+        ("no summary", add_stray, "channel 99, which is not defined"),
         ("zstd", add_private, "kind 144"),
     ],
 )

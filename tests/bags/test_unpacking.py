@@ -70,7 +70,7 @@ def test_files_that_do_not_fit_on_the_disk_are_refused(
     compressed_bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(unpacking, "LEFT", 2**62)
-    with pytest.raises(InputError, match="more than there is room for"):
+    with pytest.raises(InputError, match="more than the free space"):
         named_frames([compressed_bag])
     assert not list((tmp_path / "tmp").iterdir())
 

@@ -264,7 +264,7 @@ def test_the_papers_tables_need_a_data_set_with_a_split(
     scans = root / "sequences/002/lidar_radar_pcd"
     data = ["--paper", "table2", "--data", scans, "--card", "rehearse3d"]
     line = refused("bench", *data, "--methods", "all", "--out", tmp_path / "out")
-    assert "has no split, which the paper's tables ask for. Name the root." in line
+    assert "has no split, which the paper's tables need. Name the root." in line
 
 
 def test_a_folder_that_cannot_be_written_is_refused_before_any_work(

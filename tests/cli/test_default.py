@@ -71,7 +71,7 @@ def test_a_method_that_is_named_is_the_one_that_cleans(
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
-        (["crf"], "crf: it is a method's name, and a file or folder here has it, too. Write ./crf"),
+        (["crf"], "crf: it names a method, and also a file or folder here. Write ./crf"),
         (["dror"], "dror: it is a method, and no scans are named. Write `derain run dror SCANS"),
         (["best.yaml"], "best.yaml: it is a method, and no scans are named"),
         (
@@ -118,7 +118,7 @@ def test_scores_of_a_card_are_a_table() -> None:
 def test_a_folder_of_its_name_makes_the_name_ambiguous(run_derain, refused, here: Path) -> None:
     (here / "default").mkdir()
     line = refused("info", "default")
-    assert "default: it is the model that comes with derain, and a file or folder here" in line
+    assert "default: it names the model that comes with derain" in line
     scene(50).tofile(here / "default" / "0.bin")
     assert run_derain("info", here / "default").code == 0
     assert run_derain("info", "./default").code == 0

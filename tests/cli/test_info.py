@@ -146,7 +146,7 @@ def test_rays_of_two_returns_are_counted_and_by_labels_what_lies_behind_rain(
     rays, dual = len(np.unique(recording.ray)), int(nearer.sum())
     met = int((nearer & (recording.ray % 2 == 0)).sum())
     counted = {
-        "told by": "directions",
+        "found by": "directions",
         "rays": rays,
         "with two returns": dual,
         "share": round(dual / rays, 4),
@@ -174,7 +174,7 @@ def test_a_scan_without_a_valid_point_has_no_grid(facts_of, refused, tmp_path: P
     ("name", "content", "reason"),
     [
         ("none.ckpt", None, "there is no such file"),
-        ("weights.pt", b"12345", "weights alone do not say how they are used"),
+        ("weights.pt", b"12345", "holds weights without the Spec"),
         ("cut.bin", b"12345", "5 bytes are not whole rows of 16 bytes"),
         ("cut.label", b"12345", "is not whole labels of 4 bytes"),
         ("noise.onnx", b"12345", "not an ONNX model"),

@@ -78,7 +78,7 @@ def test_a_recording_becomes_a_model_and_a_report_whatever_its_labels(
 
     report = (work / "report.md").read_text()
     student = "The student: outdet, blind to intensity, started from mine.ckpt"
-    for heading in ("What could not be learnt", "The teacher: dror", student):
+    for heading in ("Limits of the model", "The teacher: dror", student):
         assert f"## {heading}" in report
     assert "4 scans to learn from, 1 held out" in report
     for name in ("teacher", "removed", "held_out_1", "held_out_1_beside"):
@@ -123,14 +123,14 @@ def test_a_folder_of_something_else_is_not_cleared(refused, recording: Path) -> 
     mine.parent.mkdir()
     mine.touch()
     line = refused("learn", recording, "--out", "model.onnx", "--work", "mine")
-    assert "mine: holds something other than what an earlier run left" in line
+    assert "mine: holds files that no earlier run wrote" in line
     assert mine.exists()
 
 
 @pytest.mark.parametrize(
     ("scans", "options", "names"),
     [
-        (2, (), "2 scans: too few to learn from some and choose by others"),
+        (2, (), "2 scans: too few for training and validation"),
         (3, ("--teacher", "nobody"), "derain: nobody: no such method or file"),
         (3, ("--poses", "none.txt", "--teacher", "dror"), "none.txt"),
     ],
@@ -154,7 +154,7 @@ def test_scans_that_nothing_connects_are_refused_with_the_reason(run_derain) -> 
     command = ("learn", recording, "--out", "model.onnx", "--teacher", "persistence")
     outcome = run_derain(*command)
     assert outcome.code == 2
-    assert "no two scans of the recording could be laid upon one another" in outcome.err
+    assert "no two scans of the recording could be registered" in outcome.err
     assert not Path("model.onnx").exists()
 
 

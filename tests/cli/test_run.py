@@ -96,7 +96,7 @@ def test_a_scan_for_which_the_memory_is_too_small_does_not_end_the_run(
     monkeypatch.setattr(FilterDerainer, "judge", judge_if_small)
     outcome = run_derain("run", "dror", scans, "--out", tmp_path / "out")
     assert outcome.code == 2
-    assert f"derain: {scans / '000003.bin'}: needs more memory than there is" in outcome.err
+    assert f"derain: {scans / '000003.bin'}: needs more memory than is available" in outcome.err
     assert {path.stem for path in (tmp_path / "out").glob("*.label")} == {"000001", "000002"}
 
 
@@ -147,7 +147,7 @@ def test_nothing_is_left_where_the_output_cannot_be_written(
         (["{model}", "scans", "--set", "threshold=1.5"], "threshold is 1.5. Give a number from 0"),
         (["{model}", "scans", "--runtime", "abacus"], "abacus: no such runtime"),
         (["{model}", "scans", "--precision", "bf16"], "onnxruntime computes in float32"),
-        (["dror", "scans", "--probability"], "dror says which points are rain, and not how prob"),
+        (["dror", "scans", "--probability"], "dror returns which points are rain, without prob"),
         (["{model}", "scans", "--probability"], "000001.bin: the columns of such a file have no"),
         (["dror", "scans", "--topic", "/points"], "no bag is named"),
         (["dror", "scans", "--warning", "40", "30"], "Give two numbers of metres, the second"),
@@ -295,10 +295,13 @@ def test_every_fault_is_named_with_its_first_file_and_counted(
         *map(str, (odd_scans / "b.pcd", odd_scans / "d.bin")),
         *["1 more scan"] * 2,
     ]
-    assert all("stands in" in line for line in told[:2])
+    assert all("replaced by the mean" in line for line in told[:2])
     assert summary.startswith("5 scans: 1,000 points, ")
     odd = [json.loads(line)["warnings"] for line in outcome.out.splitlines()]
-    assert [any("stands in" in text for text in texts) for texts in odd] == [False, *4 * [True]]
+    assert [any("replaced by the mean" in text for text in texts) for texts in odd] == [
+        False,
+        *4 * [True],
+    ]
     # A constant intensity was not measured: it is judged as none.
     np.testing.assert_array_equal(*(rain_in(tmp_path / "out", name) for name in "bd"))
 
@@ -313,9 +316,7 @@ def test_a_scan_that_would_lose_too_much_is_left_whole(
     outcome = run_derain("run", "ror", scans, "--out", out, *options)
     assert outcome.code == 2
     refused, summary = outcome.err.splitlines()[-2:]
-    assert refused.startswith(
-        f"derain: {scans / '000002.bin'}: left whole, for 100.0% of its valid"
-    )
+    assert refused.startswith(f"derain: {scans / '000002.bin'}: left whole: 100.0% of its valid")
     assert summary == "derain: 1 of 3 scans could not be cleaned"
     assert {path.stem for path in out.iterdir()} == {"000001", "000003"}
 

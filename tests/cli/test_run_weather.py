@@ -178,7 +178,7 @@ def test_a_table_takes_the_place_of_no_other_file(refused, recording: Path, tmp_
     scan = recording / "000003.bin"
     before = scan.read_bytes()
     line = refused("run", "dror", recording, "--out", tmp_path / "out", "--weather", scan)
-    assert f"{scan}: is there already, and no table of the weather" in line
+    assert f"{scan}: exists, and is not a table of the weather" in line
     assert scan.read_bytes() == before
     assert not (tmp_path / "out").exists()
 

@@ -154,16 +154,16 @@ def test_columns_and_a_picture(succeed, tmp_path: Path, saved_figures: list[Figu
     [
         (["--speed", "13"], "drive: a facility has none. Take the layout street."),
         (["--speed", "13", "--layout", "street", "--radar"], "drive: has no radar"),
-        (["--speed", "13", "--on", "."], "--speed: has a meaning only without --on"),
+        (["--speed", "13", "--on", "."], "--speed: works only without --on"),
         (["--rain", "-1"], "rain rate: -1.0 mm/h is no rain rate. Give up to 2000 mm/h."),
         (["--rain", "nan"], "--rain: nan is not a number."),
         (["--seed", "-1"], "--seed: -1 is negative. Give 0 or more."),
         (["--sensor", "mars"], "mars: no such sensor. Give a YAML file or one of front_128,"),
-        (["--picture"], "--picture: has a meaning only with --on. Leave it out."),
-        (["--on", "x.bin"], "--rain: it rains on scans at one rate. Give one, e.g. --rain 25."),
-        (["--on", "x.bin", "--rain", "1", "2"], "--rain: it rains on scans at one rate."),
+        (["--picture"], "--picture: works only with --on. Leave it out."),
+        (["--on", "x.bin"], "--rain: scans take a single rain rate. Give one, e.g. --rain 25."),
+        (["--on", "x.bin", "--rain", "1", "2"], "--rain: scans take a single rain rate."),
         (["--on", "x.bin", "--rain", "3"], "x.bin: there is no such file or folder. Check"),
-        (["--world", "--rain", "3"], "--rain: has a meaning only without --world"),
+        (["--world", "--rain", "3"], "--rain: works only without --world"),
     ],
 )
 def test_what_cannot_be_meant_is_refused_before_anything_is_written(

@@ -98,7 +98,7 @@ def test_scans_that_cannot_be_read_are_passed_over(run_derain, drive: Path, tmp_
     ("options", "told"),
     [
         (["--set", "rain_below=0"], "no rain was found"),
-        (["--set", "sure_within=0"], "of no point it is known whether it is rain"),
+        (["--set", "sure_within=0"], "is sure of no point"),
         (["--set", "reach=1"], "it has no parameter reach"),
         (["--poses", "none.txt"], "none.txt"),
     ],

@@ -87,7 +87,7 @@ def test_what_is_odd_is_told_once(ros2_node: ModuleType) -> None:
     points[:, 3] = 5  # which no sensor measured
     remover = ros2_node.RainRemover(Derainer(KEPT, threads=1))
     news = [remover.news(remover.judge(message_of(points))) for _ in range(2)]
-    assert "stands in" in news[0][0]
+    assert "replaced by the mean" in news[0][0]
     assert news[1] == []
 
 

@@ -122,7 +122,7 @@ def test_nothing_of_it_was_published(run_derain, toy_network: ModuleType, tmp_pa
     outcome = run_derain("import-weights", "toy", "toy.pt", "--stats", "wads", "--out", out)
     assert (outcome.code, outcome.out) == (2, "")
     assert outcome.err == (
-        "derain: toy: no weights of it were published. Known are lisnownet, outdet, salsanext.\n"
+        "derain: toy: no weights of it were published. Available: lisnownet, outdet, salsanext.\n"
     )
 
 

@@ -164,7 +164,7 @@ def test_pipes_devices_and_folders_are_not_opened(tmp_path: Path, suffix: str) -
     ("error", "reason"),
     [
         (PermissionError(), r"scan\.bin: cannot be read"),
-        (MemoryError(), r"scan\.bin: needs more memory than there is"),
+        (MemoryError(), r"scan\.bin: needs more memory than is available"),
         (BrokenPipeError("of what is printed to"), "of what is printed to"),
     ],
 )

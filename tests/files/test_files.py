@@ -75,7 +75,7 @@ def test_names_in_upper_case_and_names_as_text_are_understood(tmp_path: Path) ->
 def test_an_unknown_suffix_is_refused_with_the_known_ones(
     tmp_path: Path, use: Callable[[Path], object]
 ) -> None:
-    known = r"Known are \.asc, \.bin, \.csv, .*\.ply, \.txt, \.xyz, and each of them with \.gz\."
+    known = r"Available: \.asc, \.bin, \.csv, .*\.ply, \.txt, \.xyz, and each of them with \.gz\."
     for name in ("scan.e57", "scan", "scan.e57.gz", "scan.gz"):
         with pytest.raises(InputError, match=known):
             use(tmp_path / name)

@@ -66,7 +66,7 @@ def test_a_stated_grid_is_taken_whatever_the_scans(
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        ({"grid": "mars"}, "there is no grid named 'mars'. Known are semantickitti"),
+        ({"grid": "mars"}, "there is no grid named 'mars'. Available: semantickitti"),
         ({"grid": {"rows": 8}}, "grid: columns is missing"),
         ({"grid": "wads", "back_projection": "guess"}, "no such back-projection: 'guess'"),
     ],

@@ -136,7 +136,7 @@ def test_a_bare_road_that_shows_no_way_along_it_is_not_trusted() -> None:
         seen = np.c_[flat, np.zeros(40_000)]
         found = odometry.register(scan_from(motion(1.3 * seed), seed, world=seen))
     assert not found.trusted
-    assert "too little stands across some direction" in found.reason
+    assert "too few surfaces face some direction" in found.reason
 
 
 @pytest.mark.parametrize("degrees", [0, 1e-9, 1e-3, 1, 90, 179.999, 180])
@@ -177,8 +177,8 @@ GOOD = Fit(np.eye(4), converged=True, residual=0.03, matched=0.9, facing=0.05)
     [
         ({"matched": LEAST_MATCHED - 0.01}, "only 49% of its surfaces"),
         ({"residual": MOST_APART + 0.001}, "its surfaces lie 0.131 m from those"),
-        ({"facing": LEAST_FACING / 2}, "too little stands across some direction"),
-        ({"converged": False}, "did not come to rest"),
+        ({"facing": LEAST_FACING / 2}, "too few surfaces face some direction"),
+        ({"converged": False}, "did not converge"),
     ],
 )
 def test_each_fault_is_told(fault: dict[str, float], reason: str) -> None:
@@ -193,7 +193,7 @@ def test_what_is_usual_is_learnt_from_trusted_scans_alone() -> None:
         assert trust.misfit(poor) == ""
     for _ in range(FEWEST_USUAL):
         trust.remember(GOOD, trusted=True)
-    assert "where 0.090 m is the most" in trust.misfit(poor)
+    assert "limit of 0.090 m" in trust.misfit(poor)
     assert trust.misfit(replace(GOOD, residual=0.089)) == ""
     for _ in range(10):  # a sensor that stands fits better, and may drive off
         trust.remember(replace(GOOD, residual=0.001), trusted=True)
@@ -210,7 +210,7 @@ def test_a_motion_is_likely_where_it_is_near_the_last_or_the_last_trusted_one() 
     assert trust.unlikely(motion(1.3, yaw=9)) == ""
     assert trust.unlikely(motion(1.3, yaw=15)) != ""
     jump = motion(1.3 + 2 * LARGEST_CHANGE)
-    assert "1.0 m off what the motion so far leads to" in trust.unlikely(jump)
+    assert "1.0 m off the prediction" in trust.unlikely(jump)
     trust.remember(replace(GOOD, motion=jump), trusted=False)
     assert trust.unlikely(motion(1.4)) == ""
     assert trust.unlikely(jump) == ""

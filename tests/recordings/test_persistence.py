@@ -126,7 +126,7 @@ def test_a_registration_that_fails_is_told_of() -> None:
     last = next(method.flush())
     assert last.scan.name == "nonsense"
     details = [issue.detail for issue in method.issues(last)]
-    assert any("where it was taken is not known" in detail for detail in details)
+    assert any("its pose is not known" in detail for detail in details)
 
 
 def test_damaged_records_are_done_without(tmp_path: Path) -> None:

@@ -39,7 +39,7 @@ def test_a_read_that_never_comes_whole_is_an_error_with_both_sizes(store, tmp_pa
     store.pipe(f"{URL}/a.bin", b"12345")
     store.faults.cut = 1
     (stored,) = listed(f"{URL}/a.bin")
-    with pytest.raises(InputError, match="1 bytes came of the 5") as caught:
+    with pytest.raises(InputError, match="1 bytes arrived of the 5") as caught:
         fetch({tmp_path / "a.bin": stored})
     assert caught.value.subject == f"{URL}/a.bin"
     assert store.faults.reads == len(objects.WAITS) + 1

@@ -91,7 +91,7 @@ def test_modules_are_imported_when_somebody_asks_and_other_packages_last(
         ("import nothing_of_this_name", "ModuleNotFoundError: No module named 'nothing_of_this_"),
         ("raise OSError('no\\nlicence')", r"OSError: no licence"),
         ("def broken(", "SyntaxError: "),
-        (member("brick"), "is the name of two, things.second.Brick and foreign_bad.Brick"),
+        (member("brick"), "is the name of two entries, things.second.Brick and foreign_bad.Brick"),
     ],
 )
 def test_a_package_that_cannot_be_imported_is_warned_of_once_and_keeps_no_other_from_use(
@@ -131,7 +131,7 @@ def test_two_of_one_name_are_refused_and_both_are_named(things: Registry[type]) 
     assert "brick" in things
     with pytest.raises(InputError) as refusal:
         things.add("cobble", "brick")(Other)
-    reason = f"things: brick: is the name of two, things.second.Brick and {__name__}."
+    reason = f"things: brick: is the name of two entries, things.second.Brick and {__name__}."
     assert str(refusal.value).startswith(reason)
     assert str(refusal.value).endswith("<locals>.Other. Remove or rename one.")
     assert "cobble" not in things
@@ -174,7 +174,7 @@ def test_a_module_that_is_imported_anew_brings_its_member_anew(things: Registry[
     number: Registry[object] = things  # what is no class has no origin but itself
     for _ in range(2):
         assert number.add("five")(5) == 5
-    with pytest.raises(InputError, match="things: five: is the name of two"):
+    with pytest.raises(InputError, match="things: five: is the name of two entries"):
         number.add("five")(6)
 
 

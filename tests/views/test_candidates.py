@@ -128,7 +128,7 @@ def test_a_spec_refuses_candidates_bounded_by_what_its_network_does_not_see(
         candidates=Candidates((Bound(channel, most=3.0),)),
     )
     if refused:
-        with pytest.raises(InputError, match="bounded by what it does not see"):
+        with pytest.raises(InputError, match="bounds of channels that it does not see"):
             Spec.from_dict(spec.as_dict(), "model")
     else:
         assert Spec.from_dict(spec.as_dict(), "model") == spec

@@ -215,7 +215,7 @@ def test_a_fit_can_be_printed_and_its_grid_written_into_a_configuration() -> Non
     assert content["azimuth"] == [-180, 180]
     assert grid_of(content["grid"], "config.yaml") == fit.grid
     bent = fit_grid([sensed(np.arange(-180, 180, 0.4), BEAMS, bend=0.3)])
-    assert bent.as_dict()["beams"] == "not told apart"
+    assert bent.as_dict()["beams"] == "not found"
 
 
 RADAR = ("x", "y", "z", *(f"column {number}" for number in range(3, 10)))

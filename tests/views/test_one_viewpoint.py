@@ -271,7 +271,7 @@ def test_every_oddity_says_what_can_be_done(spinning: Points) -> None:
     remedies = {
         "divide millimetres": spinning * 1000,
         "neither in kilometres": spinning / 1000,
-        "subtract where the sensor was": moved(spinning, 4e5, 5e5),
+        "subtract the sensor's position": moved(spinning, 4e5, 5e5),
         "multiply feet": spinning * 3.28,
         "clean scans one by one": drive(10, 2.0),
         "made for sensors of many beams": street(rays(1, 1000)),

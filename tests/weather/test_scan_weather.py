@@ -127,5 +127,5 @@ def test_every_hard_case_has_a_defined_weather() -> None:
 
 def test_a_mask_has_to_fit() -> None:
     for rain in (np.zeros(9, bool), np.zeros((10, 1), bool), np.zeros(10, int)):
-        with pytest.raises(InputError, match=r"for 10 points\. Give one truth value"):
+        with pytest.raises(InputError, match=r"for 10 points\. Give True or False"):
             ScanWeather.of(scene(10), rain)

@@ -80,7 +80,7 @@ def test_cues_weigh_intensity_where_there_is_any_and_are_never_blind_to_it(tmp_p
     for source in (scans, dark):
         student = student_of(config(tmp_path / "scans", model="cues"), source)
         assert (student.config, student.settings) == ("cues_taught.yaml", {})
-    with pytest.raises(InputError, match="--blind: cues weighs intensity"):
+    with pytest.raises(InputError, match="--blind: cues uses intensity"):
         student_of(config(tmp_path / "scans", model="cues", blind=True), scans)
 
 

@@ -1,4 +1,4 @@
-"""The formats of scan files, one file each: one that lies here is known by that.
+"""The formats of scan files, one module each; every module here is registered.
 
 Each adds itself to :data:`derain.files.format.FORMATS`.
 """

@@ -73,7 +73,7 @@ class Binary(Format):
         return scan
 
     def count(self, path: Path, columns: Sequence[str]) -> int | None:
-        """Number of points of a file, of which only the beginning is read.
+        """Number of points of a file; only its beginning is read.
 
         Args:
             path: The file.
@@ -94,7 +94,7 @@ class Binary(Format):
         return None if rest else rows
 
     def names_columns(self, scan: Scan) -> bool:
-        """It does not: whoever reads it has to know them."""
+        """False: the reader has to name them."""
         return False
 
     def encode(self, path: Path, scan: Scan) -> bytes:
@@ -147,7 +147,7 @@ def _odd_share(head: bytes, value: str, columns: Sequence[str]) -> float:
 
 
 def _reach(name: str) -> float:
-    """What no number of a column exceeds."""
+    """A bound that no number of a column exceeds."""
     if name.lower() in ("x", "y", "z"):
         return LARGEST_COORDINATE
     return LARGEST_VALUE if name.lower() in INTENSITY_NAMES else np.inf

@@ -38,11 +38,11 @@ _SIZE = struct.Struct("<q")
 
 @dataclass(frozen=True, eq=False)
 class FeatherHeader:
-    """What a Feather file holds besides numbers: text, missing values, the metadata of the schema.
+    """The content of a Feather file besides numbers: text, missing values, metadata of the schema.
 
     Attributes:
         table: The file, a pyarrow.Table with a row for each point.
-        compression: How it is compressed: "uncompressed", "lz4" or "zstd".
+        compression: Its name: "uncompressed", "lz4" or "zstd".
     """
 
     table: Any
@@ -132,7 +132,7 @@ def _check_messages(arrow: ModuleType, stream: bytes, budget: MemoryBudget) -> s
     Args:
         arrow: PyArrow.
         stream: The messages.
-        budget: What there is.
+        budget: The available memory.
 
     Returns:
         How they are compressed: "uncompressed", "lz4" or "zstd".
@@ -178,5 +178,5 @@ def _member(table: Any, number: int) -> Any:
 
 
 def _slot(number: int) -> int:
-    """Where the place of a member stands in a table's index, behind two sizes of two bytes."""
+    """Position of a member's offset in a table's index, after two sizes of two bytes."""
     return 4 + 2 * number

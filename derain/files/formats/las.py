@@ -134,7 +134,7 @@ class Las(Format):
 
 @contextmanager
 def _panics_as_errors() -> Iterator[None]:
-    """What laspy's library in Rust raises on some damaged data is not even an Exception."""
+    """Converts panics of laspy's Rust library, which are no Exception, to errors."""
     try:
         yield
     except BaseException as error:
@@ -146,7 +146,7 @@ def _panics_as_errors() -> Iterator[None]:
 def _with_dimensions(
     laspy: ModuleType, path: Path, header: Any, columns: Mapping[str, NDArray[Any]]
 ) -> Any:
-    """The header with a place for further columns; itself where there are none."""
+    """The header with room for further columns; itself if there are none."""
     if not columns:
         return header
     header = deepcopy(header)
@@ -160,7 +160,7 @@ def _with_dimensions(
 
 def _refused(path: Path) -> InputError:
     return InputError(
-        path, f"only what was read from a {scan_suffix(path)} can be written as one", "Write .npz."
+        path, f"only a scan read from a {scan_suffix(path)} can be written as one", "Write .npz."
     )
 
 
@@ -215,13 +215,13 @@ def _check_counts(content: Content) -> None:
 
 
 def _check_chunks(content: Content, record: bytes, size: int, begin: int) -> None:
-    """Refuses a LAZ file whose chunks do not lie in it, for laspy allocates whatever they state.
+    """Refuses a LAZ file whose chunks exceed it, because laspy allocates the size that they state.
 
     Args:
         content: The file.
         record: The variable-length record of how the points are compressed.
         size: Bytes of a point.
-        begin: Where the compressed points begin.
+        begin: Begin of the compressed points.
 
     Raises:
         ValueError: Points of another size than the header's, more chunks than the file can hold, or
@@ -262,7 +262,7 @@ def _check_layers(data: bytes, begin: int, end: int, size: int, layers: int) -> 
 
 
 def _origin(whole: NDArray[np.int64], scales: NDArray[np.float64]) -> NDArray[np.int64]:
-    """What the coordinates of the scan are relative to."""
+    """The origin of the scan's coordinates."""
     if not ((scales > _FINEST_SCALE) & (scales < LARGEST_COORDINATE)).all():
         raise ValueError(f"the scales of the coordinates are {scales}")
     if not len(whole):

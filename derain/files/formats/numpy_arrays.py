@@ -24,20 +24,20 @@ _MEMBER = b"PK\x01\x02"
 
 @dataclass(frozen=True)
 class NpyHeader:
-    """How a .npy file holds its columns: as named fields, or side by side without names."""
+    """The layout of the columns of a .npy file: as named fields, or side by side without names."""
 
     structured: bool
 
 
 @dataclass(frozen=True)
 class NpzHeader:
-    """How an .npz file holds its columns.
+    """The layout of the columns of an .npz file.
 
     Attributes:
         constants: Arrays that are not one value per point, e.g. the angles of the beams.
         table: Name of the array that holds several columns, if there is one.
         columns: Their names.
-        structured: Whether they are named fields of that array.
+        structured: True if they are named fields of that array.
     """
 
     constants: Mapping[str, NDArray[Any]]
@@ -50,7 +50,7 @@ class NpzHeader:
 class Npy(Format):
     """One array of NumPy's."""
 
-    HELP = "one array of NumPy's"
+    HELP = "one NumPy array"
     UNNAMED = ".npy"
     DAMAGE = (Exception,)  # NumPy parses an array's header as Python code
 
@@ -89,7 +89,7 @@ class Npy(Format):
 class Npz(Format):
     """Several arrays of NumPy's, each under its name."""
 
-    HELP = "several arrays of NumPy's, by name"
+    HELP = "several NumPy arrays, by name"
     UNNAMED = ".npz of one array"
     DAMAGE = (Exception,)
 
@@ -180,7 +180,9 @@ def _arrays(content: Content) -> dict[str, NDArray[Any]]:
     with zipfile.ZipFile(io.BytesIO(content.data)) as archive:
         for member in archive.infolist():
             if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-                raise ValueError(f"{member.filename} is compressed as NumPy never does")
+                raise ValueError(
+                    f"{member.filename} is compressed by a method that NumPy does not use"
+                )
             content.budget.reserve(member.file_size)
             with archive.open(member) as file:
                 # So many bytes, not all: what a member states is not what it may expand to.

@@ -58,7 +58,7 @@ class PcdHeader:
         return np.dtype([(str(place), dtype) for place, (_, dtype) in enumerate(self.columns)])
 
     def to_bytes(self) -> bytes:
-        """The header as it stands in a file, DATA line included."""
+        """The header as bytes of a file, DATA line included."""
         dtypes = [dtype for _, dtype in self.columns]
         lines = (
             "# .PCD v0.7 - Point Cloud Data file format",
@@ -232,7 +232,7 @@ def _check_points(header: PcdHeader, points: int, rest: int) -> None:
 
 
 def _data(encoding: str, table: NDArray[Any]) -> bytes:
-    """The rows of a structured array (N,) as they stand in a file."""
+    """The rows of a structured array (N,) as bytes of a file."""
     if encoding == "ascii":
         return format_rows(table)
     if encoding == "binary":

@@ -73,7 +73,7 @@ class Element:
         return "\n".join((f"element {self.name} {self.count}", *map(str, self.properties)))
 
     def size(self, encoding: str) -> int:
-        """How many lines of text (ascii) or bytes (binary) an element without lists takes."""
+        """Number of lines of text (ascii) or bytes (binary) of an element without lists."""
         return self.count * (1 if encoding == "ascii" else self.row(encoding).itemsize)
 
     def row(self, encoding: str, list_length: int | None = None) -> np.dtype[Any]:
@@ -100,7 +100,7 @@ class Element:
 
 @dataclass(frozen=True, eq=False)
 class Faces:
-    """Faces that all have as many vertices.
+    """Faces with the same number of vertices.
 
     Attributes:
         element: Their name, number and properties, of which the first lists their vertices.
@@ -158,7 +158,7 @@ class Ply(Format):
     HELP = "polygon file: ascii or binary; its vertices, and the faces of a mesh"
 
     def decode(self, content: Content, columns: Sequence[str]) -> Scan:
-        """Reads the vertices of a PLY file, and its faces if all have as many vertices.
+        """Reads the vertices of a PLY file, and its faces if all have the same number of vertices.
 
         Args:
             content: The file, version 1.0: ascii or binary, of either byte order. Lists are
@@ -269,7 +269,7 @@ def _read_rows(
         data: Data of the file.
         encoding: Its encoding.
         row: Dtype of a row.
-        start: Where they begin: how many lines of text (ascii) or bytes (binary) come before.
+        start: Number of lines of text (ascii) or bytes (binary) before them.
         count: Number of rows.
 
     Raises:
@@ -295,7 +295,7 @@ def _read_faces(
         points: Number of vertices.
         encoding: Encoding of the file.
         data: Data of the file.
-        start: Where the element begins: how many lines of text or bytes come before.
+        start: Number of lines of text or bytes before the element.
 
     Returns:
         The faces; None for something else, or for what cannot be renumbered: faces of unequal

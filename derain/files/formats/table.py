@@ -47,11 +47,11 @@ class TableHeader:
     """A table as it was written.
 
     Attributes:
-        separator: What stands between the values of a line; None for white space.
-        named: Whether a line of the file names the columns.
+        separator: Separator of the values of a line; None for white space.
+        named: True if a line of the file names the columns.
         text: The whole file.
-        begin: Where its lines of points begin.
-        spans: Where each point's line begins and ends in the text, in bytes, int64 (N, 2).
+        begin: Begin of its lines of points.
+        spans: Begin and end of each point's line in the text, in bytes, int64 (N, 2).
         columns: Name → numbers of these lines, (N,).
     """
 
@@ -68,7 +68,7 @@ class TableHeader:
         return replace(self, spans=self.spans[rows], columns=columns)
 
     def holds(self, columns: Mapping[str, NDArray[Any]]) -> bool:
-        """Whether the lines hold just these columns, with these numbers."""
+        """True if the lines hold just these columns, with these numbers."""
         return tuple(columns) == tuple(self.columns) and all(
             np.array_equal(ours, theirs, equal_nan=True)
             for ours, theirs in zip(self.columns.values(), columns.values(), strict=True)
@@ -86,7 +86,7 @@ class TableHeader:
 class Table(Format):
     """Lines of numbers, perhaps under a line of names."""
 
-    HELP = "lines of numbers, perhaps under a line of names"
+    HELP = "lines of numbers, optionally after a line of names"
     UNNAMED = "text without a line of names"
     DAMAGE = (ValueError, csv.Error)
 
@@ -219,8 +219,8 @@ def _parse_lines(
 
     Args:
         lines: The lines.
-        separator: What stands between the values; None for white space.
-        titles: What the columns are called, for messages.
+        separator: Separator of the values; None for white space.
+        titles: Names of the columns, for messages.
 
     Raises:
         ValueError: Lines of different lengths, or values that are not numbers.
@@ -277,7 +277,7 @@ def _rows(lines: Iterable[str], separator: str | None) -> Iterator[list[str]]:
 
 
 def _number(text: str) -> float:
-    """The number that a text stands for; an empty one is NaN."""
+    """Parses a number; an empty text is NaN."""
     return float(text.strip() or "nan")
 
 

@@ -1,1 +1,1 @@
-"""What flies through the beams of a sensor: drops, flakes, drifting snow, spray and haze."""
+"""Particles in the beams of a sensor: drops, flakes, drifting snow, spray and haze."""

@@ -1,4 +1,4 @@
-"""Beams on their way through all that flies: what they meet, and what the sensor reports."""
+"""Beams among flying particles: the particles that they meet, and the sensor's reports."""
 
 from dataclasses import dataclass, replace
 from typing import Self
@@ -63,7 +63,7 @@ class Population:
     Attributes:
         number: Particles per cubic metre where they are densest, m⁻³.
         sizes: Their diameters.
-        region: Where they fly.
+        region: Region of the particles.
     """
 
     number: float
@@ -137,10 +137,10 @@ def meet(
     the strongest or the last of all that it could detect, or both.
 
     Args:
-        clear: What each beam would return through clear air to a perfect detector: one row for
+        clear: Return of each beam through clear air to a perfect detector: one row for
             each of the N beams, in their order.
         beams: Unit vectors along them, float64 (N, 3), sensor frame.
-        weather: What flies.
+        weather: The precipitation.
         sensor: The sensor that they belong to.
         generator: Random generator.
 
@@ -182,8 +182,8 @@ def uncrowded(weather: Precipitation, optics: Optics, sizes: Sizes) -> float:
     """Falling particles per cubic metre, so few that no more than the crowding meet an open beam.
 
     Args:
-        weather: What falls.
-        optics: What the sensor sees of it.
+        weather: The precipitation.
+        optics: Optics of the sensor for it.
         sizes: Diameters of the particles.
     """
     met = float(Slices(optics.nearest, optics, sizes).met.sum())
@@ -197,7 +197,7 @@ def _jittered(
 
     Args:
         particles: Those that the sensor would see if it reported all that a beam returns.
-        reach: Where each beam ends at a surface, float64 (N,), metres.
+        reach: Range at which each beam ends at a surface, float64 (N,), metres.
         jitter: Standard deviation at the detection threshold, metres.
         sensor: The sensor.
         generator: Random generator.
@@ -224,10 +224,10 @@ def draw_haze(
     is a modelling choice; what would lie behind the surface that ends the beam is left out.
 
     Args:
-        clear: What each beam would return through clear air.
+        clear: Return of each beam through clear air.
         beams: Unit vectors along them, float64 (N, 3), sensor frame.
-        weather: What flies, the haze in it.
-        optics: What the sensor sees of it.
+        weather: Precipitation, including its haze.
+        optics: Optics of the sensor for it.
         generator: Random generator.
     """
     share = np.full(len(beams), weather.haze)

@@ -1,4 +1,4 @@
-"""How large particles are, which of them a sensor detects, and how many of each a beam meets."""
+"""Sizes of particles, their detection by a sensor, and the number that a beam meets."""
 
 import math
 from dataclasses import dataclass
@@ -53,7 +53,7 @@ class Sizes:
 
     @property
     def extinction(self) -> float:
-        """What one particle per cubic metre takes out of a beam per metre, m⁻¹ · m³.
+        """Extinction of a beam per metre by one particle per cubic metre, m⁻¹ · m³.
 
         Twice its cross-section, as of everything that is much larger than the wavelength.
 
@@ -89,7 +89,7 @@ class Optics:
 
     @classmethod
     def of(cls, precipitation: Precipitation, sensor: Sensor) -> Self:
-        """How a sensor sees some precipitation.
+        """The optics of a sensor in some precipitation.
 
         Where that states a reach, the gain is such that a particle of its mean diameter is at the
         detection threshold there. A modelling choice: how strongly a particle returns over a
@@ -126,13 +126,13 @@ SLICES = 40
 
 
 class Slices:
-    """How many particles of each size a beam meets in each slice of its length.
+    """Number of particles of each size that a beam meets in each slice of its length.
 
     A beam meets a particle whose centre is no farther from its axis than half of both widths. Only
     particles count that would be seen in the middle of the beam.
 
     Args:
-        near: Where the first slice begins, metres.
+        near: Begin of the first slice, metres.
         optics: The beams.
         sizes: Of the particles.
     """

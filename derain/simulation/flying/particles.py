@@ -42,7 +42,7 @@ class Particles(Columns):
 
 @dataclass(frozen=True, eq=False)
 class Meetings(Columns):
-    """Which particle is met by which beam; a particle and a beam may each be in several.
+    """Pairs of particles and the beams that meet them; each may be in several pairs.
 
     Attributes:
         particle: Row of the particle, int64 (M,).
@@ -60,15 +60,15 @@ class Stretch:
     """The part of each beam where particles of some kind may be.
 
     Attributes:
-        near: Where it begins, float64 (N,), metres.
-        far: Where it ends, float64 (N,), metres; before ``near`` where the beam has none.
+        near: Begin of the stretch, float64 (N,), metres.
+        far: End of the stretch, float64 (N,), metres; before ``near`` where the beam has none.
     """
 
     near: Floats
     far: Floats
 
     def holds(self, beam: Ints, distance: Floats) -> Bools:
-        """Whether places on beams, by their distances in metres, are on it, bool (M,)."""
+        """True if places on beams, by their distances in metres, are on it, bool (M,)."""
         return np.asarray((self.near[beam] <= distance) & (distance <= self.far[beam]))
 
 
@@ -79,7 +79,7 @@ class OpenBeams:
     Attributes:
         directions: Unit vectors along them, float64 (N, 3), sensor frame.
         stretch: From the minimum range to the surfaces.
-        optics: What the sensor sees of particles in them.
+        optics: Optics of the sensor for particles in them.
     """
 
     directions: Floats
@@ -154,7 +154,7 @@ def draw_particles(
 
 
 def _by_nearest(drawn: Particles, drawn_for: Ints, stretch: Stretch, beams: OpenBeams) -> Bools:
-    """Which particles were drawn for the nearest of the beams that they could be drawn for."""
+    """True for particles that were drawn for the nearest of their possible beams."""
     if not len(drawn_for):
         return np.empty(0, np.bool_)
     nearest = beams.nearest(drawn.place)

@@ -1,4 +1,4 @@
-"""What flies in a scan, and the kinds of precipitation that it is drawn from."""
+"""The precipitation of a scan, and the kinds that it is drawn from."""
 
 import math
 from dataclasses import dataclass, field, fields
@@ -24,7 +24,7 @@ SMALLEST, LARGEST = 0.2, 40.0
 
 @dataclass(frozen=True)
 class Precipitation(Settings):
-    """What flies in a scan; the defaults are clear air.
+    """The precipitation of a scan; the defaults are clear air.
 
     Attributes:
         kind: Name of the kind that it was drawn from; nothing depends on it.
@@ -45,10 +45,10 @@ class Precipitation(Settings):
             ``number`` gives more, there are fewer.
         jitter: Standard deviation of the distance of a particle at the detection threshold, metres;
             it falls with the root of the power, and adds to the sensor's own noise.
-        gust_form: How the density varies in space.
+        gust_form: Form of the density's variation in space.
         gust_length: Over which length it does, metres.
-        gust_contrast: How sharply it does.
-        gust_seed: Where its waves run.
+        gust_contrast: Strength of that variation.
+        gust_seed: Directions of its waves.
         drift: Particles that drift at the ground over those that fall.
         drift_height: Height over which their density falls to 1/e, metres.
         plumes: How many cars raise spray, where so many are seen.
@@ -57,7 +57,7 @@ class Precipitation(Settings):
         haze: Share of the beams in which the air or water on the sensor returns something.
         haze_depth: Mean distance of those returns beyond the minimum range, metres.
         haze_strength: Their greatest power over the detection threshold.
-        haze_patches: How sharply they gather in parts of the view; 0 is everywhere alike.
+        haze_patches: Strength of their concentration in parts of the view; 0 is uniform.
 
     Raises:
         InputError: A value that no precipitation can have.
@@ -111,7 +111,7 @@ GREATEST = 1e9
 
 
 def is_span_of_decades(span: Span) -> bool:
-    """Whether a number can be drawn from a span evenly in its logarithm, or is always 0."""
+    """True if a number can be drawn from a span evenly in its logarithm, or is always 0."""
     low, high = span
     return (low > 0 or high == 0) and low <= high <= GREATEST
 
@@ -128,7 +128,7 @@ class Kind(Settings):
     modelling choices around the sources that kinds.yaml names; none of them was chosen by a label.
 
     Attributes:
-        weight: How often it is drawn, over the weights of the other kinds; 0 is never.
+        weight: Relative frequency of its draws among the kinds; 0 is never.
         number: m⁻³.
         diameter: Millimetres.
         shape: Of the gamma distribution.
@@ -136,23 +136,23 @@ class Kind(Settings):
         reflectivity: In 0..1.
         flicker: At most below 1.
         spill: From 1 on.
-        reach_chance: How often the reach is stated; else the sensor's threshold gives it.
+        reach_chance: Probability of a stated reach; else the sensor's threshold gives it.
         reach: Metres.
         nearest: Metres.
-        cut_off_chance: How often there is a plain cut-off.
+        cut_off_chance: Probability of a plain cut-off.
         cut_off: Metres.
         crowding: Detectable particles that an open beam meets on average, at most.
         jitter: Metres.
-        gust_chance: How often the density is uneven.
+        gust_chance: Probability of uneven density.
         gust_length: Metres.
         gust_contrast: From soft to sharp.
-        drift_chance: How often particles drift along the ground.
+        drift_chance: Probability of particles drifting along the ground.
         drift: Over those that fall.
         drift_height: Metres.
-        plume_chance: How often cars raise spray; where they do, one to three of them.
+        plume_chance: Probability of spray behind cars; where they do, one to three of them.
         plume_number: m⁻³.
         plume_length: Metres.
-        haze_chance: How often there is haze.
+        haze_chance: Probability of haze.
         haze: Share of the beams.
         haze_depth: Metres.
         haze_strength: Times the threshold.

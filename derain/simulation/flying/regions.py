@@ -1,4 +1,4 @@
-"""Where particles fly: in all the air, low over the ground, or behind cars."""
+"""Regions of particles: all the air, low over the ground, or behind cars."""
 
 import math
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ class Region(Protocol):
 
         Args:
             beams: Unit vectors, float64 (N, 3), sensor frame.
-            stretch: What the beams have in front of the surfaces.
+            stretch: The part of the beams in front of the surfaces.
         """
 
     def density(self, place: Floats) -> Floats:
@@ -45,8 +45,8 @@ class Gusts:
     Args:
         form: One of those, or ``even``.
         length: Wavelength that the waves have at least, metres: they have up to four times it.
-        contrast: How sharply the density follows the field.
-        seed: Where the waves run.
+        contrast: Strength of the density's variation with the field.
+        seed: Directions of the waves.
 
     Source: Rahimi and Recht 2007, "Random features for large-scale kernel machines", for fields of
         random plane waves.
@@ -108,7 +108,7 @@ class GroundLayer:
     Attributes:
         ground: Height of the ground in the sensor frame, metres, below 0.
         height: Over which the density falls to 1/e, metres.
-        gusts: How it varies besides.
+        gusts: Further variation.
     """
 
     ground: float
@@ -116,7 +116,7 @@ class GroundLayer:
     gusts: Gusts
 
     def stretch(self, beams: Floats, stretch: Stretch) -> Stretch:
-        """Where beams are under the top of the layer."""
+        """The part of each beam below the top of the layer."""
         top = self.ground + LAYER_TOP * self.height
         rise = beams[:, 2]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -151,7 +151,7 @@ class Plume:
 
     Attributes:
         start: Middle of the tail, on the ground, float64 (3,), metres, sensor frame.
-        heading: Where the plume goes from there, float64 (3,), a level unit vector.
+        heading: Direction of the plume from there, float64 (3,), a level unit vector.
         length: Metres.
     """
 
@@ -160,7 +160,7 @@ class Plume:
     length: float
 
     def stretch(self, beams: Floats, stretch: Stretch) -> Stretch:
-        """Where beams are in the sphere around it."""
+        """The part of each beam in the sphere around it."""
         centre = self.start + self.heading * self.length / 2
         radius = math.hypot(self.length / 2, self._half_width(self.length), 2 * PLUME_HEIGHT)
         along = beams @ centre
@@ -191,7 +191,7 @@ def draw_plumes(
     Cars drive along x, as on derain's streets, one way or the other.
 
     Args:
-        clear: What each beam would return through clear air.
+        clear: Return of each beam through clear air.
         beams: Unit vectors along them, float64 (N, 3), sensor frame.
         ground: Height of the ground in the sensor frame, metres.
         count: How many; fewer only where no car is seen.

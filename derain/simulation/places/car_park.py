@@ -83,7 +83,7 @@ def _people(aside: float, generator: Generator) -> Iterator[Surface]:
 
 
 def _between(aside: float, winter: bool, generator: Generator) -> Iterator[Surface]:
-    """What stands along the lane and where lots meet."""
+    """Objects along the lane and between the lots."""
     kinds: Options = [
         (openwork.trolley, 2),
         (openwork.bollard, 2),
@@ -106,7 +106,7 @@ def _between(aside: float, winter: bool, generator: Generator) -> Iterator[Surfa
 
 
 def _edge(winter: bool, generator: Generator) -> Iterator[Surface]:
-    """What closes the car park off: on each of four sides a hedge, a fence, or houses."""
+    """The boundary of the car park: on each of four sides a hedge, a fence, or houses."""
     makes: list[Piece] = [openwork.chain_link, openwork.railing, _nets, walls.facade]
     makes.append(_brushes if winter else plants.hedge)
     for quarter in range(4):

@@ -20,8 +20,8 @@ class Section:
     """The section across a street, metres to the left of the sensor.
 
     Attributes:
-        kerbs: Where the roadway ends, on the right and on the left; parked cars included.
-        fronts: Where the houses begin.
+        kerbs: Edges of the roadway, on the right and on the left; parked cars included.
+        fronts: Begin of the houses.
     """
 
     kerbs: tuple[float, float]
@@ -35,11 +35,11 @@ class Section:
         return cls(kerbs, (kerbs[0] - right, kerbs[1] + left))
 
     def on_the_road(self, x: float, y: float) -> bool:
-        """Whether a place is between the parked cars."""
+        """True if a place is between the parked cars."""
         return self.kerbs[0] + 2.5 < y < self.kerbs[1] - 2.5
 
     def on_a_pavement(self, x: float, y: float) -> bool:
-        """Whether a place is between a kerb and the houses."""
+        """True if a place is between a kerb and the houses."""
         right = self.fronts[0] + 0.6 < y < self.kerbs[0] - 0.2
         return right or self.kerbs[1] + 0.2 < y < self.fronts[1] - 0.6
 

@@ -36,11 +36,11 @@ class Road:
         return lambda x: self.aside + self.bend * x**2 + side * (self.half_width + outwards)
 
     def beside_it(self, x: float, y: float) -> bool:
-        """Whether a place is beside the road."""
+        """True if a place is beside the road."""
         return bool(self.outside(x, y) > 0.5)
 
     def outside(self, x: Floats | float, y: Floats | float) -> Floats:
-        """How far places are from the road, metres; less than 0 on it."""
+        """Distance of places from the road, metres; less than 0 on it."""
         from_middle = np.abs(y - self.aside - self.bend * np.asarray(x) ** 2)
         return np.asarray(from_middle - self.half_width)
 
@@ -97,7 +97,7 @@ def _verges(road: Road, generator: Generator) -> Iterator[Surface]:
 def _boundary(
     road: Road, side: int, winter: bool, snowy: bool, generator: Generator
 ) -> Iterable[Surface]:
-    """What follows the road on one side, piece by piece."""
+    """The boundary along one side of the road, piece by piece."""
     line = road.beside(side, generator.uniform(1, 7))
     gaps = generator.uniform(0, 0.4)
     makes = {

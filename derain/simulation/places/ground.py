@@ -99,8 +99,8 @@ def ground_mesh(
     """The ground about the sensor, finest near it, on a plane but for its bumps.
 
     Args:
-        kinds: What it is made of.
-        kind_at: Which of them is where, by x and y in metres, int64 as they are shaped.
+        kinds: Its materials.
+        kind_at: Kind at each place, by x and y in metres, int64 as they are shaped.
         generator: Random generator.
     """
     corners = _rings()
@@ -156,7 +156,7 @@ def bank(length: float, generator: Generator, *, snow: bool = False) -> Surface:
     Args:
         length: Metres.
         generator: Random generator.
-        snow: Whether it is of snow that a plough has left.
+        snow: True if it is of snow that a plough has left.
     """
     width, height = generator.uniform(0.8, 4), log_uniform((0.2, 2.0), generator)
     cell = np.sqrt(length * width / 1500)

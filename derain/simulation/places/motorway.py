@@ -71,7 +71,7 @@ def _driving(lanes: int, own: int, median: float, generator: Generator) -> Itera
 
 
 def _breakdown(right: float, generator: Generator) -> Iterator[Surface]:
-    """On the hard shoulder and behind the rail: somebody who waits, workers, cones, a car."""
+    """Objects on the hard shoulder and behind the rail: a waiting person, workers, cones, a car."""
 
     def on_the_shoulder(x: float, y: float) -> bool:
         return right - 2.5 < y < right + 2.3 and x < 60

@@ -1,4 +1,4 @@
-"""What rays pass in part: railings, scaffolds, lattices, trolleys, nets, fences, cables, panes.
+"""Objects that rays pass in part: railings, scaffolds, lattices, nets, fences, cables, panes.
 
 Threads are drawn as wide as beams see them, from some millimetres to some centimetres.
 """
@@ -181,9 +181,9 @@ def cable(start: Floats, end: Floats, sag: float, width: Span, generator: Genera
     """A wire or cable between two places, (3,) each, metres.
 
     Args:
-        start: Where it begins.
-        end: Where it ends.
-        sag: How far its middle hangs down, metres.
+        start: Its start.
+        end: Its end.
+        sag: Depth of its middle below the ends, metres.
         width: Between which its thickness is drawn, metres.
         generator: Random generator.
     """

@@ -48,7 +48,7 @@ def free_places(
         distances: Nearest and farthest, metres.
         apart: Least distance between two of them, metres.
         generator: Random generator.
-        allowed: Where one may be.
+        allowed: Function that allows places.
     """
     taken: list[tuple[float, float]] = []
     for number in range(count):
@@ -69,8 +69,8 @@ def scatter(
     """One thing at each place, turned at random.
 
     Args:
-        makes: What makes each of them; what has no place is left out.
-        places: Where, metres.
+        makes: Function that makes each of them; those without a place are left out.
+        places: Their places, metres.
         generator: Random generator.
     """
     for make, (x, y) in zip(makes, places, strict=False):
@@ -99,7 +99,7 @@ def line_up(
 
     Args:
         make: Makes a piece along x from the origin on, by its length in metres.
-        line: Where; a number is the line along x at that y, metres.
+        line: The line; a number is the line along x at that y, metres.
         x: From where to where, metres.
         piece: Length of a piece, metres.
         generator: Random generator.
@@ -139,10 +139,10 @@ def assemble(
 
     Args:
         ground: The ground.
-        standing: What stands on it.
-        relief: How uneven it is.
+        standing: Object on it.
+        relief: Its unevenness.
         generator: Random generator.
-        over: What may be right above the sensor: a ceiling, cables.
+        over: Objects above the sensor: a ceiling, cables.
     """
     cleared = Track.joined([Track.of(ground), _cleared(Track.of(standing))])
     track = cleared.with_surfaces(over)
@@ -182,7 +182,7 @@ def users(
 
     Args:
         generator: Random generator.
-        allowed: Where they may be.
+        allowed: Function that allows places.
         walkers: Fewest people on foot, and one more than the most.
         cars: The same of vehicles, of which few are lorries.
     """
@@ -208,9 +208,9 @@ def ragged_things(
 
     Args:
         generator: Random generator.
-        allowed: Where they may be.
+        allowed: Function that allows places.
         count: Fewest, and one more than the most.
-        leafy: Whether plants have leaves.
+        leafy: True if plants have leaves.
     """
     brushwood = of_size(plants.brushwood, (0.4, 2.5))
     things: Options = [

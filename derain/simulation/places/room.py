@@ -73,7 +73,7 @@ def _polished(surface: Surface, generator: Generator) -> Iterator[Surface]:
 
 
 def _about_axis(triangles: shapes.Triangles) -> Bools:
-    """Whether the z axis goes through a triangle, bool (T,)."""
+    """True if the z axis goes through a triangle, bool (T,)."""
     first = triangles[..., :2]
     second = np.roll(first, -1, axis=1)
     turn = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]

@@ -1,4 +1,4 @@
-"""Walls: of houses, with windows and what hangs on them, and those that close a room."""
+"""Walls: of houses, with windows and fixtures, and of rooms."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -83,7 +83,7 @@ def facade(length: float, generator: Generator) -> Iterator[Surface]:
 def _on_the_front(
     length: float, height: float, storey: float, generator: Generator
 ) -> Iterator[Surface]:
-    """What hangs on a house: drain pipes, balconies, wires, ivy, an aerial."""
+    """Fixtures on the front of a house: drain pipes, balconies, wires, ivy, an aerial."""
     pipes = [((x, -0.1, 0), (x, -0.1, height)) for x in generator.uniform(0, length, 2)]
     yield of_material([bars(pipes, 0.05)], STONE, generator)
     if height > storey + 1 and generator.random() < 0.5:
@@ -118,7 +118,7 @@ BEYOND = (1.0, 40.0)
 
 @dataclass(frozen=True)
 class Walls:
-    """Where the walls are, with the sensor at the origin.
+    """The walls around the sensor, which is at the origin.
 
     Attributes:
         x: From wall to wall along x, metres.
@@ -153,7 +153,7 @@ class Walls:
         return [(behind, right), (ahead, right), (ahead, left), (behind, left)]
 
     def holds(self, x: float, y: float) -> bool:
-        """Whether there is room for a thing between the walls."""
+        """True if there is room for a thing between the walls."""
         inside = self.x[0] + self.margin < x < self.x[1] - self.margin
         return inside and self.y[0] + self.margin < y < self.y[1] - self.margin
 

@@ -91,8 +91,8 @@ def test_a_training_that_diverges_is_one_line_and_leaves_no_checkpoint_of_it(
 
 def test_no_training_goes_on_from_weights_alone(refused, wads: list[str], checkpoint: Path) -> None:
     line = refused("fit", *wads, "--ckpt_path", checkpoint)
-    reason = "holds weights alone, no state of a training to go on from"
-    assert line.startswith(f"derain: {checkpoint}: {reason}. Go on from the last.ckpt of a run")
+    reason = "holds weights alone, without the state of a training to resume"
+    assert line.startswith(f"derain: {checkpoint}: {reason}. Resume from the last.ckpt of a run")
     assert not Path("runs").exists()
 
 

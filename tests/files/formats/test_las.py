@@ -99,8 +99,8 @@ def test_what_no_las_can_hold_is_refused(tmp_path: Path) -> None:
     )
     for other, reason in (
         (lost, "a coordinate is beyond what the file can hold"),
-        (Scan(scan.xyz), r"only what was read from a \.las"),
-        (Scan(scan.xyz, header=scan.header), r"only what was read from a \.las"),
+        (Scan(scan.xyz), r"only a scan read from a \.las"),
+        (Scan(scan.xyz, header=scan.header), r"only a scan read from a \.las"),
         (with_column(scan, "word", np.array(["a"] * 4)), "has no place for the column"),
         (with_column(scan, "n" * 33, np.zeros(4)), "has no place for the column"),
     ):

@@ -156,7 +156,7 @@ def test_the_model_applies_its_rule_to_what_the_network_changed(
 
 def test_the_residual_is_l1_unless_another_norm_is_named() -> None:
     assert LiSnowNet().hparams["norm"] == "l1"
-    with pytest.raises(InputError, match=r"no such norm: 'l3'\. Known are l1 and l2"):
+    with pytest.raises(InputError, match=r"no such norm: 'l3'\. Available: l1 and l2"):
         LiSnowNet(norm="l3")
 
 

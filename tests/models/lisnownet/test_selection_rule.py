@@ -51,7 +51,7 @@ WHOLE = SelectionRule().as_dict()
     ("content", "reason"),
     [
         ({name: value for name, value in WHOLE.items() if name != "near"}, "rule: near is missing"),
-        ({**WHOLE, "height": 1.0}, r"rule\.height: there is no such key. Known are residual, "),
+        ({**WHOLE, "height": 1.0}, r"rule\.height: there is no such key. Available: residual, "),
         ({**WHOLE, "residual": 0.0}, r"rule\.residual: 0 is not above 0"),
         ({**WHOLE, "full_scale": -255.0}, r"rule\.full_scale: -255 is not above 0"),
         ({**WHOLE, "ground": float("nan")}, r"rule\.ground: nan is not a finite number"),
@@ -168,7 +168,9 @@ def test_a_residual_is_fitted_to_changes_that_are_all_the_same(value: float) -> 
 def test_an_unknown_constant_is_refused_with_the_known_ones() -> None:
     with pytest.raises(InputError, match=r"rule: \['far', 'height'\] are no constants") as error:
         SelectionRule.fitted({"height": 1.0, "near": 2.5, "far": 9.0}, [])
-    assert "Known are ['residual', 'ground', 'intensity', 'near', 'full_scale']" in str(error.value)
+    assert "Available: ['residual', 'ground', 'intensity', 'near', 'full_scale']" in str(
+        error.value
+    )
 
 
 @pytest.mark.parametrize("scan", HARD_CASES.values(), ids=HARD_CASES)
