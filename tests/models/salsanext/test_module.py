@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import torch
 from numpy.typing import NDArray
+from recorded_scenes import write_scenes
 from torch import Tensor
 
 from derain.cards.card import load_card
@@ -17,7 +18,6 @@ from derain.datamodules.base import Loading
 from derain.datamodules.folder import Folder
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
-from derain.files.labels import write_labels
 from derain.learning.batch import Batch, Sample
 from derain.learning.losses import class_weights, segmentation_loss
 from derain.models.salsanext import SalsaNext
@@ -169,9 +169,7 @@ def test_both_losses_are_defined_for_one_kind_of_pixel(of: int, published_loss: 
 @pytest.fixture
 def scenes(tmp_path: Path) -> Callable[..., Folder]:
     """Makes a data module of four small labelled scenes."""
-    for number in range(4):
-        scene(300, seed=number).tofile(tmp_path / f"{number}.bin")
-        write_labels(tmp_path / f"{number}.label", 110 * (np.arange(300) >= 270))
+    write_scenes(tmp_path, *4 * [300], name="{}.bin", rain=110)
 
     def make(**loading: Any) -> Folder:
         parts = {"train": ["[012].bin"], "validation": ["3.bin"], "test": ["3.bin"]}
