@@ -230,13 +230,6 @@ def test_packing_keeps_the_candidates_of_every_scan_to_themselves() -> None:
     assert (len(packed["points"]), len(packed["candidates"])) == (point, candidate)
 
 
-def test_threads_do_not_change_the_view() -> None:
-    scan = Scan.of(np.random.default_rng(3).normal(size=(2000, 4)))
-    one, two = NeighbourView(threads=1)(scan), NeighbourView(threads=2)(scan)
-    np.testing.assert_array_equal(one.neighbours, two.neighbours)
-    np.testing.assert_array_equal(one.distances, two.distances)
-
-
 def test_a_real_scan_agrees_with_scikit_learn(shared: Path) -> None:
     from sklearn.neighbors import KDTree
 
