@@ -211,5 +211,6 @@ def test_what_is_to_be_light_reaches_nothing_heavy() -> None:
     light = [module for module in modules() if LIGHT_MODULES.fullmatch(module)]
     heavy = {module: reached_from(module) - modules().keys() - LIGHT for module in light}
     assert not {module: reached for module, reached in heavy.items() if reached}
+    assert "open3d" not in reached_from("derain.simulation.dataset")  # only to cast
     # What is heavy is seen.
     assert reached_from("derain.evaluation.metrics") >= {"torch", "torchmetrics"}

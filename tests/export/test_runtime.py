@@ -115,7 +115,7 @@ def test_rows_that_cannot_be_judged_are_not_rain_and_change_no_other(derainer: D
     np.testing.assert_array_equal(np.delete(probability, inserted), derainer.probability(points))
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_neither_order_nor_copies_nor_threads_matter(
     derainer: Derainer, onnx_model: Path, seed: int

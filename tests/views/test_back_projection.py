@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import torch
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -89,7 +89,6 @@ def copy_by_hand(points: ProjectedPoints, score: NDArray[np.float32]) -> list[fl
     ("back_projection", "by_hand"),
     [(nearest_range, nearest_range_by_hand), (vote, vote_by_hand), (copy, copy_by_hand)],
 )
-@settings(deadline=None)
 @given(projection=projections())
 def test_a_way_back_equals_plain_loops(
     back_projection: PixelsToPoints,

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -56,7 +56,6 @@ def test_even_grids_are_the_published_projection() -> None:
     np.testing.assert_array_equal(FULL.pixel(xyz)[clear], expected[clear])
 
 
-@settings(deadline=None)
 @given(grids())
 def test_the_middle_of_every_pixel_lies_in_it(grid: SphericalGrid) -> None:
     right, left = grid.azimuth
@@ -67,7 +66,6 @@ def test_the_middle_of_every_pixel_lies_in_it(grid: SphericalGrid) -> None:
     np.testing.assert_array_equal(grid.pixel(middles.reshape(-1, 3)), expected)
 
 
-@settings(deadline=None)
 @given(grids(), st.floats(-180, 180), st.floats(-89, 89))
 def test_a_point_has_a_pixel_exactly_if_it_is_within_the_bounds(
     grid: SphericalGrid, azimuth: float, inclination: float
@@ -142,7 +140,6 @@ def test_beams_at_the_poles_stay_below_them() -> None:
     assert SphericalGrid.of_beams([90, 70, -80], 4).edges == (90.0, 80.0, -5.0, -90.0)
 
 
-@settings(deadline=None)
 @given(grids())
 def test_a_grid_comes_back_from_json_bit_for_bit(grid: SphericalGrid) -> None:
     content = json.loads(json.dumps(grid.as_dict()))
