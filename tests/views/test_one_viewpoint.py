@@ -263,6 +263,21 @@ def test_a_scan_without_a_point_is_not_odd(points: Points) -> None:
     assert kinds(points) == []
 
 
+def test_every_oddity_says_what_can_be_done(spinning: Points) -> None:
+    remedies = {
+        "divide millimetres": spinning * 1000,
+        "neither in kilometres": spinning / 1000,
+        "subtract where the sensor was": moved(spinning, 4e5, 5e5),
+        "multiply feet": spinning * 3.28,
+        "clean scans one by one": drive(10, 2.0),
+        "made for sensors of many beams": street(rays(1, 1000)),
+        "is the sensor covered": spinning[:9],
+    }
+    for remedy, points in remedies.items():
+        (issue,) = viewpoint_issues(Scan.of(points))
+        assert remedy in issue.detail
+
+
 @pytest.mark.parametrize("method", ["network", "filter"])
 def test_networks_and_filters_say_it(spinning: Points, method: str) -> None:
     scan = Scan.of(np.column_stack([spinning * 1000, np.resize(np.arange(90.0), len(spinning))]))
