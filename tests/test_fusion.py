@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from derain.errors import InputError
@@ -140,7 +140,6 @@ def labelled(xyz: object, label: object) -> Scan:
     return Scan(np.asarray(xyz, np.float32), label=np.asarray(label, np.int64))
 
 
-@settings(deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(0, 40), st.integers(0, 40), st.floats(0.01, 5))
 def test_labels_are_those_that_brute_force_finds(
     seed: int, sources: int, queries: int, within: float

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from recorded_scenes import write_scenes
 from window_method import Between, Dimmer
 
 from derain.annotation.manifest import CARD, LABELS, TAUGHT_MANIFEST, Manifest
@@ -31,13 +32,10 @@ def make_drive(tmp_path: Path) -> MakeDrive:
     """Writes a recording of some scans, and labels of WADS if asked: every tenth point is snow."""
 
     def make(name: str = "drive", scans: int = 6, labelled: bool = False) -> Path:
-        folder = tmp_path / name / "velodyne"
-        folder.mkdir(parents=True)
-        for number in range(scans):
-            scene(POINTS, number).tofile(folder / f"{number:06d}.bin")
-            if labelled:
-                truth = np.where(np.arange(POINTS) % 10, 40, 110)
-                write_labels(folder.parent / f"labels/{number:06d}.label", truth)
+        folder = write_scenes(tmp_path / name / "velodyne", *scans * [POINTS])
+        truth = np.where(np.arange(POINTS) % 10, 40, 110)
+        for number in range(scans if labelled else 0):
+            write_labels(folder.parent / f"labels/{number:06d}.label", truth)
         return folder
 
     return make

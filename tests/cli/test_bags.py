@@ -1,8 +1,6 @@
 """Commands that read bags: they print what is in one, draw, teach and measure by its clouds."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +8,6 @@ import pytest
 from small_bags import small_bag, tables
 
 from benchmarks.recorded_bags import CLOUD_TYPE, START, STORAGES, Recorded, Ros, Storage
-from derain.annotation.manifest import HELD_OUT_PART, TRAINING_PART, Manifest
 
 
 @pytest.mark.parametrize("storage", STORAGES)
@@ -65,30 +62,3 @@ def test_a_bag_has_the_weather_of_its_scans_as_files(tmp_path: Path, succeed) ->
     assert len(told[0]) == len(clouds)
     assert told[0] == told[1]
     assert all(one["met_rain"] for one in told[0])
-
-
-def test_a_taught_bag_is_read_again_with_its_labels(tmp_path: Path, run_derain) -> None:
-    bag = small_bag(tmp_path, "mcap", clouds=tables(5))
-    root = tmp_path / "taught"
-    assert run_derain("teach", "ror", bag, "--out", root).code == 0
-    manifest = Manifest.read(root)
-
-    assert [scan.number for scan in manifest.scans] == list(range(5))
-    parts = [manifest.frames(root, part) for part in (TRAINING_PART, HELD_OUT_PART)]
-    frames = [frame for part in parts for frame in part]
-    for frame, table in zip(frames, tables(5), strict=True):
-        scan = frame.read()
-        np.testing.assert_array_equal(scan.xyz[:, 0], table["x"])
-        assert len(frame.read_label(len(scan))) == len(scan)
-
-
-def test_without_the_library_the_extra_is_named(tmp_path: Path) -> None:
-    bag = small_bag(tmp_path, "ros1")
-    program = (
-        "import sys; sys.modules['rosbags'] = None; from derain.cli.main import main; "
-        f"sys.exit(main(['info', {str(bag)!r}]))"
-    )
-    outcome = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
-    assert outcome.returncode == 2
-    assert "pip install 'derain[ros]'" in outcome.stderr
-    assert len(outcome.stderr.splitlines()) == 1

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from recorded_scenes import write_scenes
 
 from derain.cli.info import card_as_text
 from derain.default import ModelScore, default_model, model_card
@@ -20,9 +21,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The working folder, with a folder of two scans."""
     monkeypatch.chdir(tmp_path)
     for folder in ("scans", "crf"):
-        (tmp_path / folder).mkdir()
-        for number in range(2):
-            scene(200, number).tofile(tmp_path / folder / f"{number}.bin")
+        write_scenes(tmp_path / folder, 200, 200, name="{}.bin")
     return tmp_path
 
 

@@ -145,8 +145,3 @@ def test_what_cannot_be_exported_is_one_line_and_leaves_no_file(
     scene(50).tofile("bare.bin")
     assert reason in refused("export", checkpoint, "--out", "model.onnx", *options)
     assert {path.name for path in Path().iterdir()} == {"bare.bin", "empty", "scans"}
-
-
-def test_a_checkpoint_that_is_not_there_is_one_line_and_exit_code_2(refused) -> None:
-    line = refused("export", "none.ckpt", "--out", "model.onnx")
-    assert "none.ckpt: there is no such file" in line

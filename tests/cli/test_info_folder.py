@@ -165,10 +165,6 @@ def test_what_cannot_be_meant_is_one_line(
     assert reason in refused("info", data_set, *arguments)
 
 
-def test_an_empty_folder_is_refused(refused, tmp_path: Path) -> None:
-    assert "holds no scans" in refused("info", tmp_path)
-
-
 @pytest.mark.parametrize(("rain", "doubted"), [(110, False), (70, True)], ids=["WADS", "KITTI"])
 def test_a_card_that_rests_on_common_names_of_folders_is_a_guess(
     succeed, facts_of, tmp_path: Path, rain: int, doubted: bool

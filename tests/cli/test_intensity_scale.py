@@ -5,6 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from derain.pictures import scan_pictures
+
 ONCE = "--methods ssr dror --timed 1 --repeats 1"
 
 
@@ -12,6 +14,7 @@ ONCE = "--methods ssr dror --timed 1 --repeats 1"
 def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, write_labelled) -> None:
     """Three labelled scans, and the same with intensities of a 1024th, which float32 holds."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(scan_pictures, "save", lambda figure, path: None)
     for number in range(3):
         scan = Path(f"usual/{number}.bin")
         for folder in ("usual", "small"):

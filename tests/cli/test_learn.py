@@ -7,11 +7,11 @@ import lightning
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from recorded_scenes import write_scenes
 from recording_read_back import ReadBack
 
 from derain.annotation.manifest import Manifest
 from derain.cards.card import load_card
-from derain.errors import InputError
 from derain.evaluation.answers import Answers
 from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
@@ -39,11 +39,7 @@ def _quickly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def recording() -> Path:
     """Five scans of 600 points, a tenth of them drops."""
-    folder = Path("drive/velodyne")
-    folder.mkdir(parents=True)
-    for number in range(5):
-        scene(600, seed=number).tofile(folder / f"{number:06d}.bin")
-    return folder
+    return write_scenes(Path("drive/velodyne"), *5 * [600])
 
 
 def weights(model: Path) -> str:
@@ -145,19 +141,6 @@ def test_what_cannot_be_learnt_from_is_refused_and_leaves_no_model(
     assert not Path("model.onnx").exists()
 
 
-def test_scans_that_nothing_connects_are_refused_with_the_reason(run_derain) -> None:
-    recording = Path("drives")
-    recording.mkdir()
-    for number in range(3):
-        places = np.random.default_rng(number).uniform(-40, 40, (3000, 3)).astype(np.float32)
-        np.column_stack([places, places[:, :1] * 0]).tofile(recording / f"{number:06d}.bin")
-    command = ("learn", recording, "--out", "model.onnx", "--teacher", "persistence")
-    outcome = run_derain(*command)
-    assert outcome.code == 2
-    assert "no two scans of the recording could be registered" in outcome.err
-    assert not Path("model.onnx").exists()
-
-
 def test_a_recording_of_which_too_few_scans_can_be_labelled_is_refused_with_the_reason(
     recording: Path, monkeypatch: pytest.MonkeyPatch, run_derain
 ) -> None:
@@ -183,22 +166,3 @@ def test_a_clean_recording_is_refused_with_a_report_of_it(
     assert "hardly any rain was found" in outcome.err
     assert "seems to be clean" in Path("model_learning/report.md").read_text()
     assert not Path("model.onnx").exists()
-
-
-def test_a_recording_without_intensities_is_learnt_without(
-    run_derain, recording: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for scan in recording.iterdir():
-        np.fromfile(scan, np.float32).reshape(-1, 4)[:, :3].copy().tofile(scan)
-    trained: list[dict[str, object]] = []
-
-    def fit(config: str, settings: dict[str, object], quiet: bool) -> None:
-        trained.append(settings)
-        raise InputError("fit", "is not run", "")
-
-    monkeypatch.setattr(learn, "fit", fit)
-    command = ("learn", recording, "--out", "model.onnx", *QUICK, "--model", "outdet")
-    outcome = run_derain(*command, "--columns", "x,y,z")
-    assert outcome.code == 2
-    assert [settings["model.channels"] for settings in trained] == ["[x,y,z]"]
-    assert "no intensities" in outcome.out

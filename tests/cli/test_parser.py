@@ -1,7 +1,6 @@
 """What a command line gets wrong is one line that names it and what to do."""
 
 import re
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,6 @@ from derain.evaluation.hard_cases import scene
 from derain.export.storage import Storage
 from derain.files.labels import write_labels
 from derain.stores.url import place_of
-from derain.system.extras import OPTUNA
 
 
 def parser_of(command: str) -> Parser:
@@ -53,7 +51,7 @@ def test_a_value_that_an_option_cannot_have_is_refused_in_words(
 
 @pytest.fixture
 def beginner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A working folder with what a beginner has; Optuna is not installed."""
+    """A working folder with what a beginner has."""
     monkeypatch.chdir(tmp_path)
     for folder in ("scans", "empty", "mixed", "drive/velodyne", "drive/labels"):
         Path(folder).mkdir(parents=True)
@@ -63,7 +61,6 @@ def beginner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Path("mixed/notes.txt").write_text("drove north\n")
     Path("heights.csv").write_text("x,y,height\n1,2,3\n")
     torch.save({"weight": torch.zeros(1)}, "weights.pt")
-    monkeypatch.setitem(sys.modules, OPTUNA.library, None)
 
 
 @pytest.mark.usefixtures("beginner")
@@ -97,10 +94,6 @@ def beginner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         (
             "bench --data scans --card wads --methods dror --out o",
             ("scans/0.bin: ", "labels/0.label", "layout: {scans: scans, labels: FOLDER}"),
-        ),
-        (
-            "tune dror --data drive --card wads --out o.yaml",
-            ("tune: ", "needs optuna", "pip install 'derain[train]'"),
         ),
     ],
 )

@@ -3,19 +3,17 @@
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import laspy
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from derain.evaluation.hard_cases import hard_cases, scene
+from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
 from derain.files import read_scan, write_scan
 from derain.filters import DROR, DSOR, FilterDerainer
 from derain.scan import Scan
-from derain.sources.judgement import Judgement
 from derain.views.spherical_grid import SphericalGrid
 
 
@@ -83,23 +81,6 @@ def test_json_is_one_object_a_scan_and_nothing_else(
         assert list(item["milliseconds"]) == ["read", "view", "network", "back", "weather", "write"]
 
 
-def test_a_scan_for_which_the_memory_is_too_small_does_not_end_the_run(
-    run_derain, scans: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    judge = FilterDerainer.judge
-
-    def judge_if_small(self: FilterDerainer, scan: Scan, *more: Any) -> Judgement:
-        if len(scan) == 300:
-            raise MemoryError
-        return judge(self, scan, *more)
-
-    monkeypatch.setattr(FilterDerainer, "judge", judge_if_small)
-    outcome = run_derain("run", "dror", scans, "--out", tmp_path / "out")
-    assert outcome.code == 2
-    assert f"derain: {scans / '000003.bin'}: needs more memory than is available" in outcome.err
-    assert {path.stem for path in (tmp_path / "out").glob("*.label")} == {"000001", "000002"}
-
-
 @pytest.mark.parametrize(
     "command",
     [
@@ -133,20 +114,10 @@ def test_nothing_is_left_where_the_output_cannot_be_written(
     ("arguments", "reason"),
     [
         (["none.onnx", "scans"], "derain: none.onnx: no such method or file."),
-        (["notes", "scans"], "derain: notes: not an ONNX"),
-        (["{model}", "none"], "derain: none: there is no such file or folder."),
-        (["{model}", "empty"], "derain: empty: holds no scans"),
         (["{model}", "scans", "--out", "scans"], "would overwrite scans/000001.bin. Give --out"),
-        (["drorr", "scans"], "derain: drorr: no such method, file or folder. Did you mean dror?"),
-        (["ror", "scans", "--set", "radios=1"], "derain: ror: it has no parameter radios."),
-        (["ror", "scans", "--set", "radius=wide"], "derain: ror: radius is 'wide'."),
         (["ror", "scans", "--parameters", "none.yaml"], "derain: none.yaml: there is no such"),
         (["ror", "scans", "--parameters", "dsor.yaml"], "dsor.yaml: holds parameters of dsor"),
         (["dsor", "scans", "--parameters", "dsor.yaml"], "dsor: it has no parameter limit."),
-        (["{model}", "scans", "--set", "radius=1"], "it has no parameter radius."),
-        (["{model}", "scans", "--set", "threshold=1.5"], "threshold is 1.5. Give a number from 0"),
-        (["{model}", "scans", "--runtime", "abacus"], "abacus: no such runtime"),
-        (["{model}", "scans", "--precision", "bf16"], "onnxruntime computes in float32"),
         (["dror", "scans", "--probability"], "dror returns which points are rain, without prob"),
         (["{model}", "scans", "--probability"], "000001.bin: the columns of such a file have no"),
         (["dror", "scans", "--topic", "/points"], "no bag is named"),
@@ -163,29 +134,12 @@ def test_what_cannot_be_used_is_refused_before_any_work(
     reason: str,
 ) -> None:
     monkeypatch.chdir(scans.parent)
-    Path("empty").mkdir()
-    Path("notes").write_text("of no kind")
     Path("dsor.yaml").write_text("method: dsor\nlimit: 3\n")
     words = [argument.format(model=onnx_model) for argument in arguments]
     out = [] if "--out" in words else ["--out", "out"]
     assert reason in refused("run", *words, *out)
     assert names(Path("scans")) == ["000001.bin", "000002.bin", "000003.bin"]
     assert not Path("out").exists()
-
-
-def test_hard_scans_keep_every_row_that_is_not_rain(succeed, tmp_path: Path) -> None:
-    for number, case in enumerate(case for _, case in hard_cases(largest=3000)):
-        suffix = ".bin" if case.intensity is not None else ".pcd"
-        write_scan(tmp_path / "scans" / f"{number:02d}{suffix}", case)
-    outcome = succeed("run", "dror", tmp_path / "scans", "--out", tmp_path / "out")
-    assert "it holds no points" in outcome.err
-    for path in (tmp_path / "scans").iterdir():
-        before = read_scan(path)
-        label = labels(tmp_path / "out" / f"{path.stem}.label")
-        assert label.shape == (len(before),)
-        assert not label[~before.valid].any()
-        after = read_scan(tmp_path / "out" / path.name)
-        np.testing.assert_array_equal(after.xyz, before.xyz[label == 0])
 
 
 def test_parameters_come_from_a_file_and_one_by_one(succeed, tmp_path: Path) -> None:
@@ -204,33 +158,6 @@ def test_parameters_come_from_a_file_and_one_by_one(succeed, tmp_path: Path) -> 
     assert called("dsor", "--parameters", tuned, *more) == expected
     paper = FilterDerainer(DROR(variant="paper", azimuth_resolution=1.0))(scene(400)).tolist()
     assert called("dror", "--set", "variant=paper", "--set", "azimuth_resolution=1") == paper
-
-
-def test_a_model_takes_a_threshold_of_its_own_however_its_file_is_named(
-    succeed, onnx_model: Path, tmp_path: Path
-) -> None:
-    scene(400).tofile(tmp_path / "scan.bin")
-    probability = Derainer(onnx_model).probability(scene(400))
-    threshold = float(np.quantile(probability, 0.9, method="lower"))
-    tuned, out = tmp_path / "tuned.yaml", tmp_path / "out"
-    roundabout = f"{onnx_model.parent}/../{onnx_model.parent.name}/{onnx_model.name}"
-    tuned.write_text(f"method: {roundabout}\nthreshold: {threshold}\n")
-    succeed("run", onnx_model, tmp_path / "scan.bin", "--out", out, "--parameters", tuned)
-    np.testing.assert_array_equal(rain_in(out), probability > threshold)
-    assert 0 < rain_in(out).sum() < (probability > 0.5).sum()
-
-
-def test_columns_are_taken_as_stated_and_all_kept(
-    succeed, onnx_model: Path, tmp_path: Path
-) -> None:
-    points, out = scene(200), tmp_path / "out"
-    wide = np.column_stack([points, np.arange(200, dtype=np.float32)])
-    wide.tofile(tmp_path / "scan.bin")
-    stated = ["--columns", "x,y,z,intensity,ring"]
-    succeed("run", onnx_model, tmp_path / "scan.bin", "--out", out, *stated)
-    rain = Derainer(onnx_model)(points)
-    np.testing.assert_array_equal(rain_in(out), rain)
-    assert (out / "scan.bin").read_bytes() == wide[~rain].tobytes()
 
 
 def write_named(path: Path) -> Scan:
@@ -270,40 +197,6 @@ def test_cleaned_and_removed_are_the_scan_with_the_probability_as_a_column(
         np.testing.assert_array_equal(column.astype(np.float32), probability[rows])
         for name, values in part.fields.items():
             np.testing.assert_array_equal(values, scan.fields[name][rows], strict=True)
-
-
-@pytest.fixture
-def odd_scans(tmp_path: Path) -> Path:
-    """A folder of scans: ordinary, without intensity (two), and with one value of it (two)."""
-    folder = tmp_path / "odd"
-    folder.mkdir()
-    constant = scene(200) * np.array([1, 1, 1, 0], np.float32)
-    scene(200).tofile(folder / "a.bin")
-    for name in "bc":
-        write_scan(folder / f"{name}.pcd", Scan(scene(200)[:, :3].copy()))
-    for name in "de":
-        constant.tofile(folder / f"{name}.bin")
-    return folder
-
-
-def test_every_fault_is_named_with_its_first_file_and_counted(
-    succeed, odd_scans: Path, onnx_model: Path, tmp_path: Path
-) -> None:
-    outcome = succeed("run", onnx_model, odd_scans, "--out", tmp_path / "out", "--json")
-    *told, summary = outcome.said
-    assert [line.split(": ")[2] for line in told] == [
-        *map(str, (odd_scans / "b.pcd", odd_scans / "d.bin")),
-        *["1 more scan"] * 2,
-    ]
-    assert all("replaced by the mean" in line for line in told[:2])
-    assert summary.startswith("5 scans: 1,000 points, ")
-    odd = [json.loads(line)["warnings"] for line in outcome.out.splitlines()]
-    assert [any("replaced by the mean" in text for text in texts) for texts in odd] == [
-        False,
-        *4 * [True],
-    ]
-    # A constant intensity was not measured: it is judged as none.
-    np.testing.assert_array_equal(*(rain_in(tmp_path / "out", name) for name in "bd"))
 
 
 def test_a_scan_that_would_lose_too_much_is_left_whole(

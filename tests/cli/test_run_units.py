@@ -5,19 +5,14 @@ import shutil
 from pathlib import Path
 
 import pytest
-
-from derain.evaluation.hard_cases import scene
+from recorded_scenes import write_scenes
 
 OPTIONS = ("--block", 2, "--most-removed", 1)
 
 
 @pytest.fixture
 def scans(tmp_path: Path) -> Path:
-    folder = tmp_path / "scans"
-    folder.mkdir()
-    for number in range(5):
-        scene(200, seed=number).tofile(folder / f"{number:06d}.bin")
-    return folder
+    return write_scenes(tmp_path / "scans", *5 * [200])
 
 
 def test_a_run_of_more_scans_than_a_block_keeps_records_and_goes_on(
@@ -88,7 +83,3 @@ def test_options_that_exclude_each_other_are_refused(refused, scans: Path, tmp_p
     assert "--anew" in refused(*command, "--anew", "--shard", "0/2")
     assert "0 to 1" in refused(*command, "--shard", "2/2")
     assert "--workers" in refused(*command, "--workers", 2, "--dask", "tcp://127.0.0.1:1")
-
-
-def test_a_folder_without_records_has_no_status(refused, tmp_path: Path) -> None:
-    assert str(tmp_path) in refused("status", tmp_path)

@@ -71,13 +71,3 @@ def test_fit_begins_with_the_weights_of_its_start(
     last = ("--ckpt_path", run / "checkpoints/last.ckpt")
     more = ("--start", "start.ckpt", *still[:-1], "2")
     succeed("fit", *wads, *more, *last)
-
-
-def test_fit_refuses_what_it_cannot_start_from(run_derain, tmp_path: Path, wads: list[str]) -> None:
-    start = tmp_path / "start.ckpt"
-    trained(start)
-    options = [*wads, "--start", str(start)]
-    options[options.index("outdet_wads.yaml")] = "salsanext_wads.yaml"
-    outcome = run_derain("fit", *options)
-    assert outcome.code == 2
-    assert "of outdet, from which salsanext cannot start" in outcome.err.splitlines()[-1]

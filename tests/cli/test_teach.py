@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from recorded_scenes import write_scenes
 from window_method import Between
 
 from derain.annotation.manifest import CARD, LABELS, TAUGHT_MANIFEST, Manifest
@@ -28,10 +29,8 @@ def between(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def drive(tmp_path: Path) -> Path:
     """Six scans with labels of WADS, of which every tenth point is snow."""
-    folder = tmp_path / "drive/velodyne"
-    folder.mkdir(parents=True)
+    folder = write_scenes(tmp_path / "drive/velodyne", *6 * [POINTS])
     for number in range(6):
-        scene(POINTS, number).tofile(folder / f"{number:06d}.bin")
         truth = np.where(np.arange(POINTS) % 10, 10, 110)
         write_labels(folder.parent / f"labels/{number:06d}.label", truth)
     return folder

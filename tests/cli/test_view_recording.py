@@ -1,7 +1,6 @@
 """``derain view RECORDING --rerun``: what the viewer is given is what ``derain run`` finds."""
 
 import resource
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -189,15 +188,6 @@ def test_what_cannot_be_meant_is_refused_and_nothing_is_written(
     monkeypatch.chdir(tmp_path)
     assert said in refused("view", recording, *options)
     assert [file.name for file in tmp_path.iterdir()] == ["drive"]
-
-
-def test_without_rerun_the_extra_is_named(
-    refused, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "rerun", None)
-    line = refused("view", recording, "--rerun", tmp_path / "out.rrd")
-    assert "pip install 'derain[view]'" in line
-    assert not (tmp_path / "out.rrd").exists()
 
 
 def test_a_file_that_is_there_stays_until_the_new_one_is_whole(

@@ -136,7 +136,7 @@ def test_a_card_says_where_the_labels_of_sequences_and_of_scans_lie(
 
 def test_a_data_set_is_named_alone(simulated: Path, tmp_path: Path) -> None:
     for paths in ([simulated, simulated], [tmp_path, simulated]):
-        with pytest.raises(InputError, match="is a data set, of which no part can be taken beside"):
+        with pytest.raises(InputError, match="is a data set"):
             labelled_scans(paths, load_card("simulated"), Loading())
 
 

@@ -81,7 +81,7 @@ def test_scans_without_intensity_do_not_count_for_it() -> None:
 def test_a_channel_of_which_no_scan_holds_a_number_is_refused() -> None:
     nothing = Scan(np.ones((3, 3), np.float32), fields={"doppler": np.full(3, np.nan)})
     for name in ("doppler", "dopler"):
-        with pytest.raises(InputError, match=f"channel '{name}': no training scan holds a number"):
+        with pytest.raises(InputError, match=f"channel '{name}': no training scan has"):
             with_statistics(CARD, [nothing], [name])
 
 

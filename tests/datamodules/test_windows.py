@@ -95,6 +95,6 @@ def test_a_loader_gives_a_network_its_windows(monkeypatch: pytest.MonkeyPatch) -
     assert judged == [0, 1, 2, 3, 4]
     before = [[which(placed.scan) for placed in window.before] for window in windows]
     assert before == [[], [0], [1], [], [3]]
-    with pytest.raises(InputError, match=r"those around it.* Set rotation_probability"):
+    with pytest.raises(InputError, match=r"the scans around it.* Set rotation_probability"):
         scan_loader(data.source("train"), "train", task)
     scan_loader(data.source("train"), "train", task, replace(Loading(), augmentation=still))

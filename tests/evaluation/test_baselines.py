@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -35,7 +35,6 @@ def truths(draw: st.DrawFn) -> list[Truth]:
 
 
 @given(truths())
-@settings(deadline=None)
 def test_no_other_choice_by_share_is_better_on_the_training_scans(scans: list[Truth]) -> None:
     x = np.concatenate([scan.xyz[:, 0] for scan, _ in scans])
     rain = np.concatenate([rain for _, rain in scans])
@@ -82,7 +81,6 @@ def random_scan(seed: int, points: int, levels: int = 1000) -> tuple[Scan, NDArr
 
 
 @given(st.integers(0, 2**32), st.integers(1, 30), st.integers(1, 3), st.sampled_from([6, 1000]))
-@settings(deadline=None)
 def test_no_other_rule_is_better_than_the_best(
     seed: int, points: int, scans: int, levels: int
 ) -> None:

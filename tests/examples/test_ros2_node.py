@@ -72,16 +72,6 @@ def test_a_cloud_without_rain_is_the_same_cloud(ros2_node: ModuleType) -> None:
     assert result is not message
 
 
-@pytest.mark.parametrize("model", [None, KEPT], ids=["default", "outdet"])
-def test_rain_is_what_the_model_says_of_the_same_points(
-    ros2_node: ModuleType, model: Path | None
-) -> None:
-    points = scene(600)
-    derainer = Derainer(model, threads=1)
-    judgement = ros2_node.RainRemover(derainer).judge(message_of(points, height=2, gap=5))
-    np.testing.assert_array_equal(judgement.probability, derainer.probability(points))
-
-
 def test_what_is_odd_is_told_once(ros2_node: ModuleType) -> None:
     points = scene(600)
     points[:, 3] = 5  # which no sensor measured

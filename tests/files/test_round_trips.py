@@ -23,9 +23,7 @@ FLOATS = ("f4", "f8")
 TEXT_TYPES = (*VALUE_TYPES, "b1", "f2")
 NAMES = st.text("abcdefgh_0123456789-.äλ", min_size=2, max_size=6)
 # A test's own folder serves all of its examples.
-EXAMPLES = settings(
-    max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+EXAMPLES = settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 @st.composite

@@ -110,7 +110,7 @@ def by_loop(
     return rain, totals
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(
     st.integers(0, 2**32 - 1), st.integers(1, 60), st.integers(1, 8), st.sampled_from([0, 0.3, 2])
 )
@@ -134,7 +134,7 @@ def test_the_sweep_goes_once_around_from_behind_where_y_is_any_zero() -> None:
     assert _along_the_sweep(xyz).tolist() == [3, 1, 4, 0, 2]
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.integers(2, 12), st.floats(0.3, 30))
 def test_the_published_variant_does_what_its_formulas_say(
     seed: int, points: int, neighbours: int, size: float

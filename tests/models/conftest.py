@@ -1,7 +1,7 @@
 """What the tests of models share."""
 
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, TypeVar
 
 import lightning
 import numpy as np
@@ -10,6 +10,8 @@ import torch
 from torch import nn
 
 from derain.cards.card import load_card
+from derain.datamodules.in_memory import InMemory
+from derain.datamodules.scan_data import Loading
 from derain.learning.batch import Sample
 from derain.models.base import DerainingModule
 from derain.models.outdet import OutDet
@@ -118,3 +120,18 @@ def make_trainer() -> Iterator[Callable[..., lightning.Trainer]]:
 
     yield make
     torch.use_deterministic_algorithms(False)
+
+
+Trained = TypeVar("Trained", bound=DerainingModule)
+
+
+def trained_on_scenes(model: Trained, labelled: Callable[[int], Scan]) -> Trained:
+    """Trains a model on a few labelled scenes of WADS's classes."""
+    lightning.seed_everything(0)
+    train, validation = [labelled(seed) for seed in range(4)], [labelled(9)]
+    data = InMemory(train, validation, card="wads", loading=Loading(batch_size=2))
+    trainer = lightning.Trainer(
+        max_epochs=25, logger=False, enable_progress_bar=False, enable_checkpointing=False
+    )
+    trainer.fit(model, data)
+    return model.eval()

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import lightning
 import numpy as np
 import pytest
 import torch
@@ -11,11 +10,9 @@ from hypothesis import strategies as st
 from torch import Tensor
 from torch.nn import functional
 
-from derain.datamodules.in_memory import InMemory
-from derain.datamodules.scan_data import Loading
 from derain.errors import InputError
-from derain.evaluation.hard_cases import scene
-from derain.export.onnx_file import export
+from derain.evaluation.hard_cases import hard_cases, scene
+from derain.export import onnx_file
 from derain.export.runtime import Derainer
 from derain.learning.batch import Batch, Sample
 from derain.models.cues import CueFusion
@@ -25,6 +22,8 @@ from derain.models.outdet import OutDet
 from derain.scan import Scan
 from derain.views.intensity_rank import INTENSITY_RANKS
 from derain.views.isolated_points import SHELLS
+
+from .conftest import trained_on_scenes
 
 
 def labelled(seed: int, drops: int = 300, gain: float = 1.0) -> Scan:
@@ -40,25 +39,15 @@ def labelled(seed: int, drops: int = 300, gain: float = 1.0) -> Scan:
 @pytest.fixture(scope="module")
 def trained() -> CueFusion:
     """Trained on a few scenes."""
-    lightning.seed_everything(0)
-    model = CueFusion(learning_rate=1e-2)
-    data = InMemory(
-        train=[labelled(seed) for seed in range(4)],
-        validation=[labelled(9)],
-        card="wads",
-        loading=Loading(batch_size=2),
-    )
-    trainer = lightning.Trainer(
-        max_epochs=25, logger=False, enable_progress_bar=False, enable_checkpointing=False
-    )
-    trainer.fit(model, data)
-    return model.eval()
+    return trained_on_scenes(CueFusion(learning_rate=1e-2), labelled)
 
 
 @pytest.fixture(scope="module")
 def exported(trained: CueFusion, tmp_path_factory: pytest.TempPathFactory) -> Derainer:
     path = tmp_path_factory.mktemp("cues") / "model.onnx"
-    assert export(trained, path).holds
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(onnx_file, "hard_cases", lambda: hard_cases(largest=3000))
+        assert onnx_file.export(trained, path).holds
     return Derainer(path, threads=1)
 
 

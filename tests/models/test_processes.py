@@ -5,28 +5,21 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
+from recorded_scenes import write_scenes
 
-from derain.evaluation.hard_cases import scene
-from derain.files.labels import write_labels
 from derain.models.measured import MONITOR
 
 from . import two_processes
 
 # Three batches of two for two processes, the last of one scan: one process has a batch less.
 POINTS = (300, 40, 500, 120, 260)
-SNOW = 110
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """Labelled scenes of many sizes."""
-    for number, points in enumerate(POINTS):
-        scene(points, seed=number).tofile(tmp_path / f"{number}.bin")
-        drops = np.arange(points) >= 0.8 * points
-        write_labels(tmp_path / f"{number}.label", np.where(drops, SNOW, 0))
-    return tmp_path
+    return write_scenes(tmp_path, *POINTS, rain=110)
 
 
 def test_two_processes_find_what_one_finds(folder: Path) -> None:

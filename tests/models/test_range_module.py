@@ -68,7 +68,6 @@ def test_a_stated_grid_is_taken_whatever_the_scans(
     [
         ({"grid": "mars"}, "there is no grid named 'mars'. Available: semantickitti"),
         ({"grid": {"rows": 8}}, "grid: columns is missing"),
-        ({"grid": "wads", "back_projection": "guess"}, "no such back-projection: 'guess'"),
     ],
 )
 def test_a_view_that_there_is_not_is_refused(

@@ -14,9 +14,9 @@ from derain.cards.card import load_card
 from derain.datamodules.in_memory import InMemory
 from derain.datamodules.scan_data import Loading
 from derain.errors import InputError
-from derain.evaluation.hard_cases import scene
+from derain.evaluation.hard_cases import hard_cases, scene
+from derain.export import onnx_file
 from derain.export.candidates import fit_network_candidates
-from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.learning.batch import Batch, Sample
 from derain.models.relative_outdet import RelativeOutDet, RelativeOutDetNetwork
@@ -24,6 +24,8 @@ from derain.models.relative_outdet.network import in_steps
 from derain.scan import Scan
 from derain.views.candidates import Bound, Candidates
 from derain.views.neighbour_search import NeighbourSearch
+
+from .conftest import trained_on_scenes
 
 
 def sphere(rows: int, columns: int, step: float, distance: float) -> np.ndarray:
@@ -123,23 +125,14 @@ def labelled(seed: int, drops: int = 300) -> Scan:
 @pytest.fixture(scope="module")
 def trained() -> RelativeOutDet:
     """Trained on a few scenes."""
-    lightning.seed_everything(0)
-    model = RelativeOutDet(learning_rate=1e-2)
-    data = InMemory(
-        train=[labelled(seed) for seed in range(4)],
-        validation=[labelled(9)],
-        card="wads",
-        loading=Loading(batch_size=2),
-    )
-    trainer = lightning.Trainer(
-        max_epochs=25, logger=False, enable_progress_bar=False, enable_checkpointing=False
-    )
-    trainer.fit(model, data)
-    return model.eval()
+    return trained_on_scenes(RelativeOutDet(learning_rate=1e-2), labelled)
 
 
-def test_it_learns_drops_and_is_blind_to_intensity(trained: RelativeOutDet, tmp_path: Path) -> None:
-    export(trained, tmp_path / "model.onnx")
+def test_it_learns_drops_and_is_blind_to_intensity(
+    trained: RelativeOutDet, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(onnx_file, "hard_cases", lambda: hard_cases(largest=3000))
+    onnx_file.export(trained, tmp_path / "model.onnx")
     derainer = Derainer(str(tmp_path / "model.onnx"))
     scan = labelled(20)
     called, rain = derainer(scan), scan.label == 110

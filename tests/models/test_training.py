@@ -10,6 +10,7 @@ import pytest
 import torch
 from lightning.pytorch.callbacks import ModelCheckpoint
 from numpy.typing import NDArray
+from recorded_scenes import write_scenes
 
 from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.base import Loading
@@ -38,9 +39,7 @@ def iou(predicted: NDArray[np.bool_], rain: NDArray[np.bool_]) -> float:
 @pytest.fixture
 def scenes(tmp_path: Path) -> Callable[..., Folder]:
     """Makes a data module of four small labelled scenes."""
-    for number in range(4):
-        scene(300, seed=number).tofile(tmp_path / f"{number}.bin")
-        write_labels(tmp_path / f"{number}.label", RAIN * (np.arange(300) >= 270))
+    write_scenes(tmp_path, *4 * [300], name="{}.bin", rain=RAIN)
 
     def make(train: str = "[012].bin", **loading: Any) -> Folder:
         parts = {"train": [train], "validation": ["3.bin"], "test": ["3.bin"]}

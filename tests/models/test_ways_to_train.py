@@ -218,7 +218,7 @@ def test_a_run_of_loaders_goes_on_from_its_checkpoint(
     straight = fit(epochs=3)
     fit(epochs=1)
     assert_same(fit(3, tmp_path / "1.ckpt").state_dict(), straight.state_dict())
-    with pytest.raises(InputError, match="another view than the loader makes"):
+    with pytest.raises(InputError, match="view differs from that of the loader"):
         fit(3, tmp_path / "1.ckpt", rows=32)
 
 
@@ -237,9 +237,9 @@ def test_a_run_of_loaders_does_not_go_on_with_other_candidates(
         return model
 
     assert fit(None).spec.candidates is None
-    with pytest.raises(InputError, match="another view than the loader makes"):
+    with pytest.raises(InputError, match="view differs from that of the loader"):
         fit(0.9, tmp_path / "1.ckpt")
     assert fit(0.9).spec.candidates is not None
-    with pytest.raises(InputError, match="another view than the loader makes"):
+    with pytest.raises(InputError, match="view differs from that of the loader"):
         fit(None, tmp_path / "1.ckpt")
     assert fit(0.9, tmp_path / "1.ckpt").trainer.current_epoch == 2

@@ -142,8 +142,8 @@ def test_a_command_whose_extra_is_missing_says_so_in_one_line_before_any_work(
     plain: Any, scan: Path
 ) -> None:
     given, checkpoint = str(scan), str(default_model().with_suffix(".ckpt"))
-    arrow, survey = scan.with_suffix(".feather"), scan.with_suffix(".las")
-    for file in (arrow, survey):
+    arrow, survey, bag = (scan.with_suffix(suffix) for suffix in (".feather", ".las", ".bag"))
+    for file in (arrow, survey, bag):
         file.write_bytes(b"anything")
     labelled = ["--data", given, "--card", "wads"]
     tried = {
@@ -156,6 +156,7 @@ def test_a_command_whose_extra_is_missing_says_so_in_one_line_before_any_work(
         ("info", str(scan.parent), "--picture", "out.png"): ("matplotlib", "view"),
         ("view", given, "--out", "out.png"): ("matplotlib", "view"),
         ("view", given, "--window"): ("open3d", "view,scene"),
+        ("view", given, "--rerun", "out.rrd"): ("rerun", "view"),
         ("tune", "dror", *labelled, "--out", "out.yaml"): ("optuna", "train"),
         ("learn", given, "--out", "out.onnx"): ("lightning", "train"),
         ("fit", "--config", "outdet_wads.yaml"): ("jsonargparse", "train"),
@@ -169,6 +170,7 @@ def test_a_command_whose_extra_is_missing_says_so_in_one_line_before_any_work(
         ("run", given, "--out", "out", "--runtime", "openvino"): ("openvino", "openvino"),
         ("info", str(arrow)): ("pyarrow", "feather"),
         ("info", str(survey)): ("laspy", "las"),
+        ("info", str(bag)): ("rosbags", "ros"),
     }
     before = {*scan.parent.iterdir()}
     found = outcomes(plain, *map(list, tried))

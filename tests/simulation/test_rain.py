@@ -194,7 +194,7 @@ def test_the_strongest_and_the_last_of_all_that_a_beam_meets_are_reported(
     assert set(kinds) == {-1, 0, 1}  # lost, kept, rain
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     rate=st.floats(0, 200),
     seed=st.integers(0, 2**32),

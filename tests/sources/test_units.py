@@ -132,7 +132,7 @@ def standing() -> Source:
     return derain.Frames.of_scans(scans).map(lambda frame: frame.with_pose(np.eye(4)))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     bad=st.frozensets(st.integers(0, SCANS - 1)),
     block=st.integers(1, SCANS),

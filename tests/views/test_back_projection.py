@@ -1,11 +1,12 @@
 """The ways back against plain loops, at every border and in every tie."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 import torch
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -80,40 +81,21 @@ def vote_by_hand(points: ProjectedPoints, score: NDArray[np.float32]) -> list[fl
     return result
 
 
-@settings(deadline=None)
-@given(projections())
-def test_nearest_range_equals_plain_loops(
+def copy_by_hand(points: ProjectedPoints, score: NDArray[np.float32]) -> list[float]:
+    return [score[pixel] for pixel in points.pixel]
+
+
+@pytest.mark.parametrize(
+    ("back_projection", "by_hand"),
+    [(nearest_range, nearest_range_by_hand), (vote, vote_by_hand), (copy, copy_by_hand)],
+)
+@given(projection=projections())
+def test_a_way_back_equals_plain_loops(
+    back_projection: PixelsToPoints,
+    by_hand: Callable[..., list[float]],
     projection: tuple[ProjectedPoints, NDArray[np.float32]],
 ) -> None:
-    np.testing.assert_array_equal(nearest_range(*projection), nearest_range_by_hand(*projection))
-
-
-@settings(deadline=None)
-@given(projections())
-def test_the_vote_equals_plain_loops(
-    projection: tuple[ProjectedPoints, NDArray[np.float32]],
-) -> None:
-    np.testing.assert_allclose(vote(*projection), vote_by_hand(*projection), rtol=1e-6)
-
-
-@settings(deadline=None)
-@given(projections())
-def test_copying_gives_every_point_its_pixels_score(
-    projection: tuple[ProjectedPoints, NDArray[np.float32]],
-) -> None:
-    points, score = projection
-    assert copy(points, score).tolist() == [score[pixel] for pixel in points.pixel]
-
-
-def test_a_wall_behind_a_drop_follows_the_wall() -> None:
-    pixel = [*range(25), 12]
-    wall_and_drop = project(pixel, [20.0] * 12 + [3.0] + [20.0] * 12 + [20.1], (5, 5), wraps=False)
-    rain = np.zeros(25, np.float32)
-    rain[12] = 1
-    assert nearest_range(wall_and_drop, rain)[[12, 25]].tolist() == [1, 0]
-    assert copy(wall_and_drop, rain)[[12, 25]].tolist() == [1, 1]
-    # The own pixel votes as if it showed the wall, but it is one of five.
-    assert vote(wall_and_drop, rain)[25] == pytest.approx(0.2)
+    np.testing.assert_allclose(back_projection(*projection), by_hand(*projection), rtol=1e-6)
 
 
 @pytest.mark.parametrize("back_projection", [nearest_range, vote])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -25,7 +25,6 @@ def street(points: int, seed: int, drops: float = 0.2) -> tuple[Scan, NDArray[np
     return Scan.of(np.column_stack([xyz, intensity])), rain
 
 
-@settings(deadline=None)
 @given(
     st.lists(st.tuples(st.integers(1, 2000), st.integers(0, 99)), min_size=1, max_size=3),
     st.sampled_from([0.5, 0.9, 0.99, 0.999]),

@@ -85,16 +85,12 @@ NEAR = {"channel": "range", "most": 30.0}
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ([], r"c: \[\] is not a mapping"),
         ({}, "c: bounds is missing"),
         ({"bounds": []}, r"c\.bounds: it bounds no channel, or one twice"),
         ({"bounds": [NEAR, NEAR]}, r"c\.bounds: it bounds no channel, or one twice"),
         ({"bounds": [{"channel": "z"}]}, r"c\.bounds\[0\]: it has neither least nor most"),
         ({"bounds": [{"most": 1.0}]}, r"c\.bounds\[0\]: channel is missing"),
         ({"bounds": [{**NEAR, "most": "far"}]}, r"c\.bounds\[0\]\.most: 'far' is not a finite"),
-        ({"bounds": [{**NEAR, "most": float("nan")}]}, r"most: nan is not a finite number"),
-        ({"bounds": [{**NEAR, "most": 1e300}]}, r"most: 1e\+300 is not within"),
-        ({"bounds": [{**NEAR, "least": -(10**400)}]}, r"least: the number is too large"),
         ({"bounds": [{**NEAR, "least": 31}]}, r"c\.bounds\[0\]: its least is more than its most"),
         ({"bounds": [NEAR], "rain": 1.5}, r"c\.rain: 1\.5 is not within 0 and 1"),
         ({"bounds": [NEAR], "sky": 0}, r"c\.sky: there is no such key"),

@@ -60,7 +60,7 @@ def points_at_borders(draw: st.DrawFn) -> tuple[SphericalGrid, NDArray[np.float3
     return grid, xyz
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(points_at_borders())
 def test_points_on_borders_have_the_pixel_that_trigonometry_gives_them(
     points: tuple[SphericalGrid, NDArray[np.float32]],
@@ -69,7 +69,6 @@ def test_points_on_borders_have_the_pixel_that_trigonometry_gives_them(
     np.testing.assert_array_equal(grid.pixel(xyz), computed(grid, xyz))
 
 
-@settings(deadline=None)
 @given(
     st.sampled_from(GRIDS),
     hnp.arrays(
@@ -117,7 +116,6 @@ def test_nearly_all_points_are_looked_up(grid: SphericalGrid) -> None:
     assert (grid.table(scattered(20_000)) < UNSURE_BELOW).mean() < 0.06
 
 
-@settings(deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 1e-3, 1e-6]))
 def test_rounding_moves_no_point_by_a_quarter_of_the_margin(seed: int, flat: float) -> None:
     rng = np.random.default_rng(seed)

@@ -11,7 +11,6 @@ from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases
 from derain.files import DEFAULT_COLUMNS, read_scan
 from derain.scan import Scan
-from derain.simulation.sensor import Sensor
 from derain.views.grid_fit import PIXELS_PER_RETURN, fit_grid
 from derain.views.spherical_grid import WADS_BEAMS, grid_of
 
@@ -97,14 +96,6 @@ def test_a_sensor_that_looks_one_way_gets_a_grid_that_does(ahead: float) -> None
 def test_a_sector_of_less_than_30_degrees_without_returns_leaves_the_circle_closed() -> None:
     assert fit_grid([sensed(np.arange(-166, 166, 0.4), BEAMS)]).grid.is_full_circle
     assert not fit_grid([sensed(np.arange(-164, 164, 0.4), BEAMS)]).grid.is_full_circle
-
-
-def test_the_simulated_sensor_gets_a_row_for_each_beam_and_loses_nothing() -> None:
-    sensor = Sensor()
-    fit = fit_grid([Scan((20 * sensor.beams()).astype(np.float32))])
-    assert len(fit.beams) == fit.grid.rows == sensor.rows
-    assert fit.grid.columns == 448  # 400 shots
-    assert (fit.hidden, fit.outside) == (0, 0)
 
 
 def test_bent_beams_give_even_rows_of_their_step() -> None:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -57,6 +57,7 @@ def test_drops_are_isolated_and_a_wall_is_not() -> None:
     assert isolated[scan.label == 0].mean() < 0.2
 
 
+@settings(max_examples=10)
 @given(st.integers(0, 2**32 - 1))
 def test_what_is_seen_does_not_depend_on_the_order_of_rows(seed: int) -> None:
     scan = wall_and_drops()

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
@@ -38,7 +38,6 @@ def brute_force(xyz: NDArray[np.float32], k: int) -> tuple[NDArray[np.int64], ND
 
 
 @pytest.mark.parametrize("clouds", [gridded, scattered], ids=["gridded", "scattered"])
-@settings(deadline=None)
 @given(data=st.data(), k=st.integers(1, 12))
 def test_neighbours_equal_brute_force(
     clouds: st.SearchStrategy[NDArray[np.float32]], data: st.DataObject, k: int
@@ -53,7 +52,6 @@ def test_neighbours_equal_brute_force(
     np.testing.assert_allclose(distances, expected_distances, rtol=1e-6, atol=1e-12)
 
 
-@settings(deadline=None)
 @given(gridded, st.randoms(use_true_random=False))
 def test_the_answer_does_not_depend_on_the_order_inside(xyz: NDArray[np.float32], random) -> None:
     xyz = np.unique(xyz, axis=0)
@@ -65,7 +63,6 @@ def test_the_answer_does_not_depend_on_the_order_inside(xyz: NDArray[np.float32]
     np.testing.assert_array_equal(shuffle[shuffled], neighbours[shuffle])
 
 
-@settings(deadline=None)
 @given(st.one_of(gridded, scattered))
 def test_distinct_positions_are_those_of_numpy_unique(xyz: NDArray[np.float32]) -> None:
     first, inverse = distinct_positions(xyz)
@@ -75,7 +72,6 @@ def test_distinct_positions_are_those_of_numpy_unique(xyz: NDArray[np.float32]) 
     np.testing.assert_array_equal(xyz[first][inverse], xyz)
 
 
-@settings(deadline=None)
 @given(gridded, st.randoms(use_true_random=False))
 def test_distinct_rows_are_those_of_the_rows_that_can_be_judged(
     xyz: NDArray[np.float32], random
@@ -179,7 +175,6 @@ def test_packing_keeps_every_scan_to_itself() -> None:
 NEAR_AND_LOW = Candidates((Bound("range", most=15.0), Bound("intensity", most=30.0)))
 
 
-@settings(deadline=None)
 @given(st.integers(0, 200), st.integers(0, 50), st.integers(1, 9), st.floats(0, 60))
 def test_candidates_have_the_neighbourhoods_that_they_have_among_all(
     points: int, seed: int, k: int, farthest: float
@@ -228,13 +223,6 @@ def test_packing_keeps_the_candidates_of_every_scan_to_themselves() -> None:
         np.testing.assert_array_equal(packed["candidates"][those], one.candidates + row)
         row, point, candidate = rows.stop, point + len(one.points), those.stop
     assert (len(packed["points"]), len(packed["candidates"])) == (point, candidate)
-
-
-def test_threads_do_not_change_the_view() -> None:
-    scan = Scan.of(np.random.default_rng(3).normal(size=(2000, 4)))
-    one, two = NeighbourView(threads=1)(scan), NeighbourView(threads=2)(scan)
-    np.testing.assert_array_equal(one.neighbours, two.neighbours)
-    np.testing.assert_array_equal(one.distances, two.distances)
 
 
 def test_a_real_scan_agrees_with_scikit_learn(shared: Path) -> None:

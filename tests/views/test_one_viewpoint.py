@@ -63,12 +63,8 @@ def street(directions: Points, x: float = 0.0) -> Points:
     return directions * range_[:, None]
 
 
-def scan_of(points: Points) -> Scan:
-    return Scan.of(points)
-
-
 def kinds(points: Points) -> list[str]:
-    return [issue.kind for issue in viewpoint_issues(scan_of(points))]
+    return [issue.kind for issue in viewpoint_issues(Scan.of(points))]
 
 
 SKYWARD = rays(64, 1024) @ [[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]]
@@ -237,7 +233,7 @@ def test_crowding_is_that_of_counting_point_after_point() -> None:
     generator = np.random.default_rng(1)
     directions = rays(8, 400)[generator.integers(0, 3200, 20_000)]
     range_ = 40 * generator.uniform(0.1, 1, (20_000, 1)) ** 0.3  # most are far off
-    scan = scan_of(directions * range_)
+    scan = Scan.of(directions * range_)
     crowding = crowding_far_off(rays_near_axes(scan))
     assert crowding == pytest.approx(crowding_by_hand(scan), rel=0.01)
     assert crowding > 1.5
@@ -278,7 +274,7 @@ def test_every_oddity_says_what_can_be_done(spinning: Points) -> None:
         "is the sensor covered": spinning[:9],
     }
     for remedy, points in remedies.items():
-        (issue,) = viewpoint_issues(scan_of(points))
+        (issue,) = viewpoint_issues(Scan.of(points))
         assert remedy in issue.detail
 
 
@@ -311,23 +307,11 @@ def test_no_real_scan_is_odd(real: dict[str, Scan]) -> None:
     ("change", "kind"),
     [
         (lambda xyz: xyz * 1000, "points farther off than sensors see"),
-        (lambda xyz: xyz * 100, "points farther off than sensors see"),
         (lambda xyz: xyz / 1000, "points nearer than sensors see"),
-        (lambda xyz: xyz / 100, "nearer"),
         (lambda xyz: xyz / 10, "nearer"),
         (lambda xyz: xyz + np.float32([4e5, 5e5, 200]), "coordinates of a map"),
         (lambda xyz: xyz * np.float32([1, 1, 1e-4]), "a single beam"),
         (lambda xyz: xyz[:20], "almost empty"),
-    ],
-    ids=[
-        "millimetres",
-        "centimetres",
-        "kilometres",
-        "hectometres",
-        "decametres",
-        "map",
-        "plane",
-        "few",
     ],
 )
 def test_every_real_scan_is_once_it_is_changed(

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
@@ -44,7 +44,6 @@ def shown_by_hand(scan: Scan, pixel: NDArray[np.int64], size: int) -> list[int]:
 
 
 @pytest.mark.parametrize("grid", [FULL, FRONT], ids=["full circle", "front"])
-@settings(deadline=None)
 @given(points=clouds)
 def test_every_pixel_shows_the_nearest_of_its_points(
     grid: SphericalGrid, points: NDArray[np.float32]
@@ -65,7 +64,6 @@ def test_every_pixel_shows_the_nearest_of_its_points(
     np.testing.assert_array_equal(image.nearest.ravel(), np.float32(nearest))
 
 
-@settings(deadline=None)
 @given(points=clouds, random=st.randoms(use_true_random=False))
 def test_the_order_of_the_rows_changes_nothing_but_ties(
     points: NDArray[np.float32], random: st.randoms
@@ -125,7 +123,6 @@ BOUNDS = st.builds(
 
 @pytest.mark.parametrize("back_projection", BACK_PROJECTIONS)
 @pytest.mark.parametrize("grid", [FULL, FRONT], ids=["full circle", "front"])
-@settings(deadline=None)
 @given(points=clouds, candidates=BOUNDS, seed=st.integers(0, 2**32 - 1))
 def test_candidates_are_given_scores_of_candidates_alone(
     grid: SphericalGrid,

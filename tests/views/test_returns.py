@@ -26,7 +26,7 @@ def assert_same(found: RayReturns, expected: RayReturns) -> None:
         np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), err_msg=name)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.integers(0, 2**32), st.floats(0.01, 0.9), st.sampled_from([0.25, 0.3, 1.0]))
 def test_the_rays_of_a_sensor_of_two_returns_are_found(
     seed: int, share: float, step: float

@@ -23,7 +23,7 @@ def of_one(xyz: NDArray[np.float64]) -> float:
     return float(scatter_through_space(xyz, np.arange(len(xyz))[None])[0])
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(clouds)
 def test_it_is_the_share_of_the_smallest_eigenvalue(xyz: NDArray[np.float64]) -> None:
     if np.ptp(xyz, axis=0).max() > 1e-3:  # below, the mean of far numbers rounds it away

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -56,7 +56,6 @@ def test_even_grids_are_the_published_projection() -> None:
     np.testing.assert_array_equal(FULL.pixel(xyz)[clear], expected[clear])
 
 
-@settings(deadline=None)
 @given(grids())
 def test_the_middle_of_every_pixel_lies_in_it(grid: SphericalGrid) -> None:
     right, left = grid.azimuth
@@ -67,7 +66,6 @@ def test_the_middle_of_every_pixel_lies_in_it(grid: SphericalGrid) -> None:
     np.testing.assert_array_equal(grid.pixel(middles.reshape(-1, 3)), expected)
 
 
-@settings(deadline=None)
 @given(grids(), st.floats(-180, 180), st.floats(-89, 89))
 def test_a_point_has_a_pixel_exactly_if_it_is_within_the_bounds(
     grid: SphericalGrid, azimuth: float, inclination: float
@@ -142,7 +140,6 @@ def test_beams_at_the_poles_stay_below_them() -> None:
     assert SphericalGrid.of_beams([90, 70, -80], 4).edges == (90.0, 80.0, -5.0, -90.0)
 
 
-@settings(deadline=None)
 @given(grids())
 def test_a_grid_comes_back_from_json_bit_for_bit(grid: SphericalGrid) -> None:
     content = json.loads(json.dumps(grid.as_dict()))
@@ -179,41 +176,16 @@ def test_a_user_describes_a_grid_in_yaml() -> None:
     [
         ("kitti", "no grid named 'kitti'"),
         (None, "it is empty"),
-        ([64, 2048], "[64, 2048] is not a mapping"),
         ({}, "columns is missing"),
         ({"columns": 64}, "its rows are described by nothing"),
         ({"columns": 64, "rows": 16}, "described by rows"),
         ({"columns": 64, "rows": 16, "inclination": [-5, 5], "beams": [1, 2]}, "described by"),
-        (
-            {"columns": 64, "rows": 16, "inclination": [-5, 5], "fov": 3},
-            "fov: there is no",
-        ),
-        (
-            {"columns": 6.5, "rows": 16, "inclination": [-5, 5]},
-            "columns: 6.5 is not",
-        ),
-        (
-            {"columns": True, "rows": 16, "inclination": [-5, 5]},
-            "columns: True is not",
-        ),
-        ({"columns": 64, "rows": "16", "inclination": [-5, 5]}, "rows: '16' is not a whole number"),
-        ({"columns": 64, "rows": 16, "inclination": -5}, "inclination: -5 is not a list"),
+        ({"columns": 64, "rows": 16, "inclination": [-5, 5], "fov": 3}, "fov: there is no"),
+        ({"columns": 6.5, "rows": 16, "inclination": [-5, 5]}, "columns: 6.5 is not"),
         ({"columns": 64, "rows": 16, "inclination": [-5]}, "inclination: [-5] are not 2 numbers"),
-        ({"columns": 64, "rows": 16, "inclination": "12"}, "inclination: '12' is not a list"),
-        (
-            {"columns": 64, "rows": 16, "inclination": [math.nan, 5]},
-            "[0]: nan is not a",
-        ),
         ({"columns": 64, "rows": 16, "inclination": [5, -5]}, "inclination from 5 to -5"),
         ({"columns": 64, "rows": 16, "inclination": [-95, 5]}, "inclination from -95 to 5"),
-        (
-            {"columns": 0, "rows": 16, "inclination": [-5, 5]},
-            "0 is not a whole number from 1 to 4",
-        ),
-        (
-            {"columns": 64, "rows": -2, "inclination": [-5, 5]},
-            "rows: -2 is not a whole",
-        ),
+        ({"columns": 0, "rows": 16, "inclination": [-5, 5]}, "0 is not a whole number from 1 to 4"),
         ({"columns": 10**9, "rows": 10**9, "inclination": [-5, 5]}, "columns: 1000000000 is not"),
         ({"columns": 2**12, "rows": 2**11, "inclination": [-5, 5]}, "2048 rows by 4096 columns"),
         ({"columns": 64, "rows": 16, "inclination": [-5, 10**400]}, "too large"),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import yaml
 from matplotlib.image import imread
+from recorded_scenes import write_scenes
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
@@ -80,10 +81,7 @@ def test_every_step_is_shown_and_leaves_its_files(small: DemoConfig) -> None:
 def test_the_model_that_comes_with_derain_cleans_your_own_scans(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    mine = tmp_path / "mine"
-    mine.mkdir()
-    for number in range(2):
-        scene(500, number).tofile(mine / f"{number}.bin")
+    mine = write_scenes(tmp_path / "mine", 500, 500, name="{}.bin")
     (mine / "cut.bin").write_bytes(b"12345")
     out, lines = tmp_path / "out", []
     report = clean_given_scans(mine, DEFAULT_COLUMNS, out, Steps(lines.append, 1))

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from recorded_scenes import write_scenes
 from small_bags import small_bag
 
 from derain.annotation.teach import teach
@@ -11,7 +12,6 @@ from derain.cards.card import load_card
 from derain.datamodules.taught import Taught
 from derain.evaluation.answers import NOT_KNOWN, RAIN
 from derain.evaluation.counts import Counts
-from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
 from derain.filters import DROR, FilterDerainer
 from derain.recordings.persistence import PersistenceDerainer
@@ -27,10 +27,7 @@ DROPS = np.arange(300) >= 270
 @pytest.fixture
 def data(tmp_path: Path) -> Taught:
     """A drive of three scans that a filter has taught."""
-    drive = tmp_path / "drive/velodyne"
-    drive.mkdir(parents=True)
-    for number in range(3):
-        scene(300, seed=number).tofile(drive / f"{number}.bin")
+    drive = write_scenes(tmp_path / "drive/velodyne", *3 * [300], name="{}.bin")
     teach(FilterDerainer(DROR()), named_frames([drive]), tmp_path / "taught")
     return Taught(str(tmp_path / "taught"))
 
@@ -77,10 +74,7 @@ def test_labels_that_cannot_be_used_are_named(data: Taught, tmp_path: Path, card
 
 
 def test_persistence_sees_the_scans_around_those_held_out(tmp_path: Path) -> None:
-    drive = tmp_path / "drive/velodyne"
-    drive.mkdir(parents=True)
-    for number in range(12):
-        scene(2000, seed=number).tofile(drive / f"{number:02}.bin")
+    drive = write_scenes(tmp_path / "drive/velodyne", *12 * [2000])
     teach(FilterDerainer(DROR()), named_frames([drive]), tmp_path / "taught")
     data = Taught(str(tmp_path / "taught"))
     recording = with_poses(named_frames([drive]), "standing")

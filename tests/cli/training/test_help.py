@@ -7,9 +7,11 @@ import pytest
 from derain.workflows.configurations import packaged_configs
 
 
-@pytest.mark.parametrize("command", ["fit", "validate", "test", "predict"])
-@pytest.mark.parametrize("option", ["--help", "-h"])
-def test_help_fits_on_a_screen_and_starts_with_examples(succeed, command: str, option) -> None:
+@pytest.mark.parametrize(
+    ("command", "option"),
+    [("fit", "--help"), ("validate", "-h"), ("test", "--help"), ("predict", "-h")],
+)
+def test_help_fits_on_a_screen_and_starts_with_examples(succeed, command: str, option: str) -> None:
     outcome = succeed(command, option)
     assert len(outcome.out.splitlines()) < 40
     examples, options = outcome.out.split("\noptions:\n")

@@ -1,4 +1,4 @@
-"""The packaged mixture trains, tests and predicts, on two small made-up data sets."""
+"""The packaged mixture trains and predicts, on two small made-up data sets."""
 
 import json
 from collections.abc import Callable
@@ -33,17 +33,11 @@ def test_the_packaged_mixture_goes_from_training_to_predictions(
 
     data = ["--config", "outdet_mixture.yaml", *QUICK]
     succeed("fit", *data, "--data.weights.snow", "2")
-    run = Path("runs/outdet_mixture")
-    checkpoint = run / "version_0/checkpoints/best.ckpt"
+    checkpoint = Path("runs/outdet_mixture/version_0/checkpoints/best.ckpt")
     spec = load_model(checkpoint).spec
     assert spec.data == "WADS + simulated rain"
     assert spec.training["sequences of WADS"] == tuple(sorted(load_card("wads").split["train"]))
     assert len(spec.training["scans"]) == 1
-
-    succeed("test", *data, "--ckpt_path", checkpoint)
-    classes = json.loads((run / "version_0/test.json").read_text())["classes"]
-    assert classes["snow: falling-snow"]["points"] == 30 * len(load_card("wads").split["test"])
-    assert classes["streets: rain"] == {**classes["streets: rain"], **{"points": 30, "rain": True}}
 
     succeed("predict", *data, "--ckpt_path", checkpoint)
     written = sorted(Path("predictions").rglob("*.label"))

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-import yaml
 
 resource = pytest.importorskip("resource", reason="the system has no limits on files")
 
@@ -42,14 +41,3 @@ def test_a_log_folder_that_cannot_be_written_is_one_line(
     assert line.startswith(str(Path.cwd() / folder))
     assert "cannot be written (" in line
     assert "--trainer.logger.save_dir" in line
-
-
-def test_the_configuration_of_a_run_is_written_whole(
-    succeed, wads: list[str], checkpoint: Path
-) -> None:
-    succeed("validate", *wads, "--ckpt_path", checkpoint)
-    written = Path("runs/outdet_wads/version_0/config.yaml")
-    found = yaml.safe_load(written.read_text())
-    assert found["data"]["init_args"]["root"] == wads[wads.index("--data.root") + 1]
-    assert found["ckpt_path"] == str(checkpoint)
-    assert not list(written.parent.glob(".*"))

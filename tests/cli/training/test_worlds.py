@@ -22,7 +22,6 @@ precipitation: {snow: {weight: 1, crowding: [0.1, 0.3]}}
 """
 
 
-@pytest.mark.usefixtures("one_block")
 def test_worlds_are_made_trained_on_and_exported(succeed, monkeypatch: pytest.MonkeyPatch) -> None:
     try:
         import_open3d()

@@ -1,4 +1,4 @@
-"""Trains, measures and predicts as a process of torchrun, which gives each command its turn.
+"""Trains and measures as a process of torchrun, which gives each command its turn.
 
 torchrun ... two_machines.py CONFIG CHECKPOINT
 """
@@ -10,6 +10,4 @@ from derain.cli.main import main
 if __name__ == "__main__":
     config, checkpoint = sys.argv[1:]
     main(["fit", "--config", config])
-    for command in ("validate", "test", "predict"):
-        code = main([command, "--config", config, "--ckpt_path", checkpoint])
-        assert code == 0, command
+    assert main(["test", "--config", config, "--ckpt_path", checkpoint]) == 0

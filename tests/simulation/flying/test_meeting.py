@@ -100,7 +100,7 @@ def test_both_returns_come_where_any_particle_is_before_a_dim_surface(spill: flo
     assert (detected.range[rain] > SPARSE.minimum_range - 1e-3 * snow.largest / 2).all()
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     kind=st.sampled_from(sorted(KINDS)),
     seed=st.integers(0, 2**32),

@@ -17,7 +17,7 @@ def read(value: object) -> PrecipitationSpans:
     return PrecipitationSpans.of(Entry("world.yaml", "precipitation", value))
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(seed=st.integers(0, 2**32), name=st.sampled_from(sorted(KINDS)))
 def test_every_number_is_within_its_span_or_switched_off(seed: int, name: str) -> None:
     kind = KINDS[name]

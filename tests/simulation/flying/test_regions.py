@@ -73,7 +73,7 @@ def returns(places: np.ndarray, label: int) -> tuple[Returns, np.ndarray]:
     return clear, places / distance[:, None]
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 2**32), x=st.floats(-30, 30), y=st.sampled_from([-4.0, 3.0]))
 def test_spray_is_behind_a_car_at_one_of_its_ends(seed: int, x: float, y: float) -> None:
     generator = np.random.default_rng(seed)
