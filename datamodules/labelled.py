@@ -51,7 +51,9 @@ class LabelledScans(ScanData):
         return self._source_of(part)
 
 
-def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> LabelledScans:
+def labelled_scans(
+    paths: Sequence[Path], card: DataCard, loading: Loading, topic: str | None = None
+) -> LabelledScans:
     """The scans that a command's ``--data`` names.
 
     Args:
@@ -60,6 +62,7 @@ def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> L
             folder that ``derain teach`` wrote, whose labels are used.
         card: Data card of the scans.
         loading: Options for reading scans.
+        topic: Topic of the bags among them; None where each has only one of clouds.
 
     Raises:
         InputError: A root beside other paths, or one whose sequences hold no known folder of
@@ -68,7 +71,7 @@ def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> L
     taught = [path for path in paths if is_taught(path)]
     roots = taught or [path for path in paths if os.path.isdir(path / card.layout.sequences)]
     if not roots:
-        return named_scans(paths, card, loading)
+        return named_scans(paths, card, loading, topic)
     root = roots[0]
     if len(paths) > 1:
         raise InputError(
@@ -84,7 +87,9 @@ def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> L
     return LabelledScans(card, loading, source_of)
 
 
-def named_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> LabelledScans:
+def named_scans(
+    paths: Sequence[Path], card: DataCard, loading: Loading, topic: str | None = None
+) -> LabelledScans:
     """Scans named one by one or by their folders, the same ones for every part.
 
     A scan's labels are ``<stem>.label`` beside it or in the sibling folder of labels.
@@ -94,10 +99,12 @@ def named_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> Labe
         card: Data card of the scans. Its layout is the first to be searched for sequences and
             labels.
         loading: Options for reading scans.
+        topic: Topic of the bags among them; None where each has only one of clouds.
     """
 
     def source_of(part: Part) -> Source:
-        return named_frames(paths, loading.columns, labelled=True, layouts=layouts_for(card))
+        layouts = layouts_for(card)
+        return named_frames(paths, loading.columns, labelled=True, layouts=layouts, topic=topic)
 
     return LabelledScans(card, loading, source_of, has_parts=False)
 

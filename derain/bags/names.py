@@ -5,7 +5,6 @@ A bag is named like a folder of its topics, and a topic like a folder of its clo
 """
 
 import os
-from collections.abc import Iterable
 from pathlib import Path
 
 from derain.errors import InputError
@@ -88,27 +87,21 @@ def split(path: Path) -> tuple[Path, str] | None:
     return None
 
 
-def within(paths: Iterable[Path], topic: str | None) -> list[Path]:
-    """The same paths, where a topic is appended to those of bags.
+def in_bag(path: Path, topic: str | None) -> Path:
+    """The path of a topic in a bag.
 
     Args:
-        paths: Bags and any other paths.
-        topic: The topic; None leaves the paths as they are.
+        path: The bag, or any other path.
+        topic: The topic; None returns the path as it is.
 
     Raises:
-        InputError: A topic, and no bag that could have it.
+        InputError: A topic, and the path is of no bag.
     """
-    paths = list(paths)
     if topic is None:
-        return paths
-    found = {path: bags_at(path) for path in paths}
-    if not any(found.values()):
-        raise InputError("--topic", "no bag is named to which it could apply", "Leave it out.")
-    return [
-        each
-        for path in paths
-        for each in ([bag / topic.strip("/") for bag in found[path]] or [path])
-    ]
+        return path
+    if not is_bag(path):
+        raise InputError("--topic", f"{path} is not a bag", "Leave it out.")
+    return path / topic.strip("/")
 
 
 def stem(bag: Path) -> str:

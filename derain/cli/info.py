@@ -35,7 +35,7 @@ from typing import Any
 
 import yaml
 
-from derain.bags.names import is_bag, within
+from derain.bags.names import in_bag, is_bag
 from derain.cli.info_file import facts_of_file
 from derain.cli.info_folder import draw, facts_of_folder
 from derain.cli.options import add_columns, add_topic
@@ -141,7 +141,7 @@ def _describe(name: str, arguments: argparse.Namespace) -> None:
     if name == DEFAULT:  # not ./default, which is a file or folder; a Path would make both the same
         _describe_default(arguments.json)
         return
-    path = within([Path(name)], arguments.topic)[0]
+    path = in_bag(Path(name), arguments.topic)
     if os.path.isdir(path) and not is_bag(path):
         _describe_folder(path, arguments)
         return

@@ -19,7 +19,7 @@ from derain.evaluation.contents import (
 from derain.evaluation.text_tables import plain_table
 from derain.jobs.running import Submits, Task, values
 from derain.simulation.manifest import manifest_of
-from derain.sources.folders import find_layout, recordings_below
+from derain.sources.folders import find_layout
 from derain.sources.frame import Frame
 from derain.sources.units import Division, FrameUnit, folder_of_paths, shared_options, units_of
 from derain.stores.url import Place
@@ -143,9 +143,10 @@ def facts_of_folder(
             records of another folder.
     """
     card = None if card_name is None else load_card(card_name)
+    layouts = layouts_for(card)
     layout = _layout(folder, card, layout_names)
     card, rests_on = (card, "--card") if card else _card(folder, layout)
-    sequences = find_sequences(folder, layout, columns)
+    sequences = find_sequences(folder, layout, columns, layouts)
     rates = sorted(
         {sequence.rain_rate for sequence in sequences}, key=lambda rate: (rate is None, rate or 0)
     )
@@ -196,8 +197,7 @@ def draw(facts: FolderFacts, picture: Path) -> None:
 def _layout(folder: Path, card: DataCard | None, stated: str | None) -> Layout | None:
     """The layout of a folder: as stated, by its data card, or by the names of its folders."""
     if stated is None:
-        is_of_recordings = bool(recordings_below(folder, layouts_for(card)))
-        return None if is_of_recordings else find_layout(folder, layouts_for(card))
+        return find_layout(folder, layouts_for(card))
     folders = stated.split(",")
     if len(folders) != 2:
         raise InputError(

@@ -24,7 +24,6 @@ beside the model, which a second run clears.
 import argparse
 from pathlib import Path
 
-from derain.bags.names import within
 from derain.cli.options import add_columns, add_poses, add_topic, count, file_named
 from derain.cli.outputs import print_lines
 from derain.cli.playback import refuse_unusable, write_and_report
@@ -91,7 +90,8 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.rerun is not None:
         refuse_unusable(arguments.rerun)
     config = LearnConfig(
-        recordings=within(arguments.recording, arguments.topic),
+        recordings=arguments.recording,
+        topic=arguments.topic,
         out=arguments.out,
         folder=arguments.work,
         model=arguments.model,

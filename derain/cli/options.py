@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from derain.bags.names import within
 from derain.cards.card import packaged_cards
 from derain.cli.parser import number, whole
 from derain.errors import printable
@@ -196,8 +195,7 @@ def labelled(
     from derain.datamodules.scan_data import Loading
 
     loading = Loading(columns=columns, intensity_scale=intensity_scale, deduplicate=distinct)
-    paths = within(paths, topic)
-    return labelled_scans(paths, card_of(paths, card), loading)
+    return labelled_scans(paths, card_of(paths, card), loading, topic)
 
 
 def command_line(

@@ -162,7 +162,8 @@ def main(arguments: argparse.Namespace) -> int:
     name, scans = method_and_scans(arguments.method, arguments.scans or [])
     division = division_of(arguments)
     alone = method_of(name, arguments)
-    frames = frames_at(scans, arguments.columns, arguments.topic)
+    results = [folder for folder in (arguments.out, arguments.removed) if folder is not None]
+    frames = frames_at(scans, arguments.columns, arguments.topic, results)
     source = with_given_poses(frames, arguments).map(
         lambda frame: frame.with_intensity_times(arguments.intensity_scale)
     )

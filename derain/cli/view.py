@@ -30,7 +30,7 @@ from pathlib import Path
 
 import numpy as np
 
-from derain.bags.names import is_bag, within
+from derain.bags.names import in_bag, is_bag
 from derain.cards.card import load_card
 from derain.cards.known import layouts_for
 from derain.cli import options
@@ -127,7 +127,7 @@ def main(arguments: argparse.Namespace) -> int:
     if not (arguments.out or arguments.window):
         raise InputError(path, "no output is named", "Give --out, --window or --rerun.")
     require("view", MATPLOTLIB, *((OPEN3D,) if arguments.window else ()))
-    _view_scan(within([path], arguments.topic)[0], arguments)
+    _view_scan(in_bag(path, arguments.topic), arguments)
     return 0
 
 

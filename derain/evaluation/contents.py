@@ -98,7 +98,10 @@ def rate_name(rate: float | None) -> str:
 
 
 def find_sequences(
-    root: Path, layout: Layout | None, columns: Sequence[str] = DEFAULT_COLUMNS
+    root: Path,
+    layout: Layout | None,
+    columns: Sequence[str] = DEFAULT_COLUMNS,
+    layouts: Sequence[Layout] | None = None,
 ) -> list[SequenceOfFrames]:
     """The sequences of a data set, by name.
 
@@ -107,12 +110,14 @@ def find_sequences(
             of scans, or any folder of scans, which counts as one sequence.
         layout: Names of the folders; None for a folder of scans, or of recordings.
         columns: Names of the columns of files that do not name them.
+        layouts: Names of the folders of recordings that may be sequences of data sets; by default
+            those in the packaged data cards.
 
     Raises:
         InputError: A folder without sequences or scans, or a damaged weather record.
     """
     if layout is None:
-        recordings = recordings_of(named_frames(root, columns, labelled=True))
+        recordings = recordings_of(named_frames(root, columns, labelled=True, layouts=layouts))
         return [SequenceOfFrames(each[0].sequence, Frames(each), None) for each in recordings]
     folders = scan_folders(root, layout)
     if not folders:

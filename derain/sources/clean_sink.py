@@ -74,6 +74,7 @@ class CleanSink:
                 self._refuse_own_bag(frame)
         self._files.refuse_clashes(source)
         self._bags = CleanedBags(self.folder, source, bags, probability)
+        self._refuse_files_in_bags()
         in_bag = next(filter(self._is_in_bag, source), None)
         if removed is not None and in_bag is not None:
             raise InputError(
@@ -143,6 +144,21 @@ class CleanSink:
 
     def _is_in_bag(self, frame: Frame) -> bool:
         return isinstance(frame, StoredBag) or self._bags.takes(frame)
+
+    def _refuse_files_in_bags(self) -> None:
+        """Refuses a scan in a file whose result would be in the folder of a bag's copy."""
+        stored = (frame for frame in self._source if isinstance(frame, StoredBag))
+        bags = {self.folder / bag.written_path for bag in stored} | {*self._bags.targets()}
+        if not bags:
+            return
+        for frame in self._source:
+            folders = () if self._is_in_bag(frame) else self._files.scan_path(frame).parents
+            for bag in bags.intersection(folders):
+                raise InputError(
+                    frame.name,
+                    f"its result would be in {url_of(bag)}, where a bag of that name is written",
+                    "Take them in two runs, each to its --out.",
+                )
 
     def _refuse_own_bag(self, bag: StoredBag) -> None:
         target = self.folder / bag.written_path

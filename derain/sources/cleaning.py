@@ -123,7 +123,7 @@ def clean(
         InputError: No scans, a folder whose files would be overwritten, or a bag that cannot be
             written; records of other options in the folder; an executor that has ended.
     """
-    source = source_of(source)
+    source = source_of(source, results=[] if isinstance(sink, CleanSink) else [sink])
     monitor = WeatherMonitor(weather, source, knows_recordings=placing is None)
     sample = None if weather.every_scan else monitor.sample
     cleaned: list[CleanedScan] = []

@@ -31,6 +31,9 @@ from derain.system.notices import warn_once
 # Scans may be written as text, but beside folders of scans a text is a note or a record.
 TEXTS = (".csv", ".txt")
 
+# File that only a simulated data set has.
+MANIFEST_OF_SIMULATION = "manifest.json"
+
 # Gives the clouds of a bag, or at a path into one, with or without labels, whose keys begin with a
 # prefix unless it is empty.
 FramesOfBag = Callable[[Path, bool, str], Sequence[Frame]]
@@ -53,6 +56,7 @@ def named_frames(
     layouts: Sequence[Layout] | None = None,
     recordings: bool = False,
     topic: str | None = None,
+    results: Sequence[Path] = (),
 ) -> Frames:
     """The scans that a user names.
 
@@ -74,6 +78,7 @@ def named_frames(
             recordings.
         recordings: True if each folder is a recording, which numbers its scans as others do.
         topic: Topic of the bags among them; None where each has only one of clouds.
+        results: Folders of results, which are passed over in a folder of recordings.
 
     Returns:
         The scans in the order they are named, those of a folder sorted by name. Each has its stem
@@ -86,7 +91,7 @@ def named_frames(
             or a topic where there is no bag.
     """
     given = [paths] if isinstance(paths, str | Path) else paths
-    finder = FrameFinder(columns, labelled, layouts, recordings, topic)
+    finder = FrameFinder(columns, labelled, layouts, recordings, topic, results)
     return finder.frames([or_example(Path(path)) for path in given])
 
 
@@ -97,9 +102,10 @@ class FrameFinder:
     Attributes:
         columns: Names of the columns of files that do not name them.
         labelled: True to read labels.
-        layouts: What the folders of data sets may be called.
+        layouts: Names of the folders of data sets.
         recordings: True if each folder is a recording.
         topic: Topic of the bags.
+        results: Folders of results, which are no recordings.
         frames_of_bag: Gives the clouds of each bag.
     """
 
@@ -108,32 +114,44 @@ class FrameFinder:
     layouts: Sequence[Layout] | None = None
     recordings: bool = False
     topic: str | None = None
+    results: Sequence[Path] = ()
     frames_of_bag: FramesOfBag = _clouds_of_bag
 
     def frames(self, paths: Sequence[Path]) -> Frames:
         """The scans at paths, in their order; errors as :func:`named_frames` raises them."""
-        inside = [recordings_below(path, self.layouts) for path in paths]
-        if self.topic is not None and not any(map(bags_at, chain(paths, *inside))):
-            raise InputError("--topic", "no bag is named that could have it", "Leave it out.")
-        if not any(inside):
+        below = [recordings_below(path, self.layouts, self.results) for path in paths]
+        if self.topic is not None and not any(map(bags_at, chain(paths, *below))):
+            raise InputError("--topic", "no bag is named to which it could apply", "Leave it out.")
+        if not any(below):
             return Frames(self._named(paths))
         frames: list[Frame] = []
-        for path, recordings in zip(paths, inside, strict=True):
-            frames += self._below(path, recordings) if recordings else self._named([path])
+        for path, found in zip(paths, below, strict=True):
+            if found:
+                frames += self._below(path, found)
+            else:
+                frames += self._named([path], several=len(paths) > 1)
         return Frames(frames)
 
-    def _below(self, folder: Path, recordings: Sequence[Path]) -> Iterator[Frame]:
+    def _below(self, folder: Path, found: Sequence[Path]) -> Iterator[Frame]:
         """The scans of the recordings in a folder, with the paths of these in their keys."""
-        for path in recordings:
-            of_bag, name = is_bag(path), path.relative_to(folder).as_posix()
-            if of_bag:
-                name = path.relative_to(folder).with_name(stem(path)).as_posix()
-            for frame in self._clouds(path, name) if of_bag else self._named([path]):
-                key = frame.key if of_bag else f"{name}/{frame.key}"
-                yield replace(frame, key=key, sequence=name)
+        for path in found:
+            place = path.relative_to(folder)
+            if is_bag(path):
+                name = place.with_name(stem(path)).as_posix()
+                for frame in self._clouds(path, name):
+                    yield replace(frame, sequence=name)
+            else:
+                name = place.as_posix()
+                for frame in self._named([path]):
+                    yield replace(frame, sequence=name, key=f"{name}/{frame.key}")
 
-    def _named(self, paths: Sequence[Path]) -> list[Frame]:
-        """The scans at paths, none of which is a folder of recordings."""
+    def _named(self, paths: Sequence[Path], several: bool = False) -> list[Frame]:
+        """The scans at paths, none of which is a folder of recordings.
+
+        Args:
+            paths: The paths.
+            several: True if there are other paths besides.
+        """
         found = [_scans_or_bags(path, self.layouts) for path in paths]
         scans = [scan for of_path, _ in found for scan in of_path]
         # A data set's scans lie in several folders, those of any other path in one.
@@ -142,7 +160,7 @@ class FrameFinder:
         where = partial(label_of, layouts=self.layouts) if self.labelled else lambda _: None
         keys = relative_keys(scans) if by_path else None
         files = iter(frames_of(scans, where, self.columns, keys))
-        several = len(paths) > 1 or any(len(bags) > 1 for _, bags in found)
+        several = several or len(paths) > 1 or any(len(bags) > 1 for _, bags in found)
         frames: list[Frame] = []
         for of_path, bags in found:
             frames += islice(files, len(of_path))
@@ -152,17 +170,23 @@ class FrameFinder:
 
     def _clouds(self, bag: Path, prefix: str) -> Sequence[Frame]:
         """The clouds of a bag, or at a path into one."""
-        within = bag if self.topic is None else bag / self.topic.strip("/")
-        return self.frames_of_bag(within if is_bag(bag) else bag, self.labelled, prefix)
+        if self.topic is not None and is_bag(bag):
+            bag /= self.topic.strip("/")
+        return self.frames_of_bag(bag, self.labelled, prefix)
 
 
-def source_of(scans: GivenScans, columns: Sequence[str] = DEFAULT_COLUMNS) -> Source:
+def source_of(
+    scans: GivenScans,
+    columns: Sequence[str] = DEFAULT_COLUMNS,
+    results: Sequence[Path | str] = (),
+) -> Source:
     """The source that a program means, with the labels that its scans have.
 
     Args:
         scans: A source; or one or more scans in memory, frames, files and folders of scans, or URLs
             of files and folders.
         columns: Names of the columns of files that do not name them.
+        results: Folders or URLs of results, which are passed over in a folder of recordings.
 
     Raises:
         InputError: No scans, something else than scans, a path that does not exist, or a folder
@@ -182,9 +206,10 @@ def source_of(scans: GivenScans, columns: Sequence[str] = DEFAULT_COLUMNS) -> So
             case str() if is_url(item):
                 from derain.sources.store_listing import frames_at
 
-                frames += frames_at([item], columns)
+                frames += frames_at([item], columns, results=results)
             case str() | Path():
-                frames += named_frames(item, columns, labelled=True)
+                here = [Path(folder) for folder in results if not is_url(folder)]
+                frames += named_frames(item, columns, labelled=True, results=here)
             case _:
                 reason = f"{type(item).__name__} is no scan"
                 raise InputError("scans", reason, "Give Scans, or paths of files and folders.")
@@ -322,52 +347,89 @@ def find_layout(root: Path, layouts: Iterable[Layout] | None = None) -> Layout |
     return next((layout for layout in known if scan_folders(root, layout)), None)
 
 
-def recordings_below(folder: Path, layouts: Sequence[Layout] | None = None) -> list[Path]:
+def recordings_below(
+    folder: Path, layouts: Sequence[Layout] | None = None, results: Sequence[Path] = ()
+) -> list[Path]:
     """Finds the recordings in a folder of them: folders of scans, sequences and bags at any depth.
 
     Args:
         folder: The folder, or any other path.
         layouts: As for :func:`named_frames`.
+        results: Folders to pass over. Hidden folders, and those with records of a job, are passed
+            over, too, and folders of texts alone.
 
     Returns:
-        Their paths, sorted; none where the path is itself what :func:`named_frames` takes whole: a
-        file, a folder with scans or with nothing but bags directly in it, or a data set. Hidden
-        folders, and those of results with records of a job, are passed over.
+        Their paths, sorted; none where the path itself is what :func:`named_frames` takes: a file,
+        a folder with scans or bags directly in it, or a data set or a part of one.
     """
-    if layouts == () or not os.path.isdir(folder) or is_bag(folder) or _holds_scans(folder):
+    takes_none = layouts is not None and not layouts
+    if takes_none or not os.path.isdir(folder) or _holds_scans(folder) or bags_at(folder):
         return []
-    found = _recordings_at(folder, layouts)
-    return found if {*found} != (_sequences_at(folder, layouts) or {*bags_at(folder)}) else []
+    if (layout := find_layout(folder, layouts)) is not None:
+        _warn_of_other_folders(folder, scan_folders(folder, layout))
+        return []
+    found = sorted({*_Search(folder, layouts, results).inside(folder)})
+    if found:
+        _warn_of_others(folder, found)
+    return found
 
 
-def _recordings_at(folder: Path, layouts: Sequence[Layout] | None) -> list[Path]:
-    """All recordings in a folder, which may be one itself, sorted."""
-    if is_bag(folder) or _holds_scans(folder):
-        return [folder]
-    sequences = _sequences_at(folder, layouts)
-    found = {*sequences, *bags_at(folder)}
-    if all(sequence.parent == folder for sequence in sequences):  # else it is a data set
-        for inside in _folders_in(folder):
-            found.update(() if inside in found else _recordings_at(inside, layouts))
-    return sorted(found)
+class _Search:
+    """A search for recordings, which enters each folder once.
+
+    Args:
+        root: The folder that it begins in.
+        layouts: As for :func:`named_frames`.
+        results: Folders to pass over.
+    """
+
+    def __init__(
+        self, root: Path, layouts: Sequence[Layout] | None, results: Sequence[Path]
+    ) -> None:
+        self._root = Path(os.path.realpath(root))
+        self._layouts = layouts
+        self._entered = set(map(os.path.realpath, results))
+
+    def inside(self, folder: Path) -> Iterator[Path]:
+        """The recordings in a folder; one that cannot be read is warned of."""
+        for each in self._folders_in(folder):
+            try:
+                yield from self._at(each)
+            except InputError as error:
+                warn_once(f"{error} It is passed over.")
+
+    def _at(self, folder: Path) -> Iterator[Path]:
+        """The recordings that a folder is, or that lie in it."""
+        if is_bag(folder) or _holds_scans(folder):
+            yield folder
+        layout = find_layout(folder, self._layouts)
+        scans = [] if layout is None else scan_folders(folder, layout)
+        sequences = [each.parent for each in scans]
+        yield from sequences
+        lies_in_others = all(sequence.parent == folder for sequence in sequences)
+        if lies_in_others and not is_bag(folder):  # no data set, and no sequence of one
+            yield from bags_at(folder)
+            yield from self.inside(folder)
+
+    def _folders_in(self, folder: Path) -> list[Path]:
+        """The folders in a folder that are to be entered, links last."""
+        with reading(folder), os.scandir(folder) as entries:
+            inside = [each for each in entries if each.is_dir() and not each.name.startswith(".")]
+        found = []
+        for entry in sorted(inside, key=lambda each: (each.is_symlink(), each.name)):
+            place = os.path.realpath(entry.path)
+            leads_up = self._root.is_relative_to(place)
+            if not leads_up and place not in self._entered and not _is_of_job(place):
+                found.append(folder / entry.name)
+            self._entered.add(place)
+        return found
 
 
-def _sequences_at(folder: Path, layouts: Sequence[Layout] | None) -> set[Path]:
-    """The sequences of a data set, or of a part of one."""
-    layout = find_layout(folder, layouts)
-    return set() if layout is None else {each.parent for each in scan_folders(folder, layout)}
-
-
-def _folders_in(folder: Path) -> Iterator[Path]:
-    """The folders in a folder; none that is hidden, has records of a job, or leads back up."""
-    real = Path(os.path.realpath(folder))
-    with reading(folder), os.scandir(folder) as entries:
-        for entry in entries:
-            if entry.name.startswith(".") or not entry.is_dir():
-                continue
-            leads_up = entry.is_symlink() and real.is_relative_to(os.path.realpath(entry.path))
-            if not leads_up and not (folder / entry.name / JOB_RECORDS).exists():
-                yield folder / entry.name
+def _is_of_job(folder: str) -> bool:
+    """True if a folder holds results with records; a simulated data set has records, too."""
+    names = (JOB_RECORDS, MANIFEST_OF_SIMULATION)
+    has_records, is_data_set = (os.path.exists(os.path.join(folder, name)) for name in names)
+    return has_records and not is_data_set
 
 
 def _scans_or_bags(path: Path, layouts: Sequence[Layout] | None) -> tuple[list[Path], list[Path]]:
@@ -421,6 +483,23 @@ def _warn_of_others(path: Path, taken: Sequence[Path]) -> None:
     if others:
         counts = ", ".join(f"{number:,} {kind}" for kind, number in sorted(others.items()))
         warn_once(f"{path}: {counts} passed over; name them to have them read")
+
+
+def _warn_of_other_folders(folder: Path, taken: Sequence[Path]) -> None:
+    """Warns of folders of scans beside sequences that lie directly in a folder."""
+    whole = Path(os.path.abspath(folder))
+    sequences = [Path(os.path.abspath(scans)).parent for scans in taken]
+    if any(sequence.parent != whole for sequence in sequences):
+        return
+    names = {sequence.name for sequence in sequences}
+    with reading(folder), os.scandir(folder) as entries:
+        others = [each.path for each in entries if each.is_dir() and each.name not in names]
+    number = sum(_holds_scans(Path(other)) for other in others)
+    if number:
+        folders = "folder" if number == 1 else "folders"
+        warn_once(
+            f"{folder}: {number:,} other {folders} of scans passed over; name them to read them"
+        )
 
 
 def _kind(entry: os.DirEntry[str]) -> str:

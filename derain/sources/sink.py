@@ -116,13 +116,6 @@ class FolderSink:
                 f"would overwrite {frame.name}",
                 "Give --removed another folder.",
             )
-        for folder in filter(None, (self.folder, self.removed)):
-            if _is_result(frame, folder):
-                raise InputError(
-                    frame.name,
-                    f"is among the scans, and {url_of(folder)} is where results are written",
-                    "Give results a folder that is not among the recordings.",
-                )
         # Results that lie where labels are looked for would be taken for the truth.
         target = self.path(frame, LABEL)
         places = (frame.label_path, beside(frame.path, LABEL), *label_places(frame.path))
@@ -158,15 +151,6 @@ class LabelSink(FolderSink):
 
     def _refuse_own_files(self, frame: FileFrame) -> None:
         """No scan is written, and of labels only those matter that are there."""
-
-
-def _is_result(frame: FileFrame, folder: Path) -> bool:
-    """True if a scan of a folder of recordings lies in the results, which are one of them."""
-    path, results = os.path.abspath(frame.path), os.path.abspath(folder)
-    if not path.startswith(f"{results}/"):
-        return False
-    within = os.path.relpath(path, os.path.dirname(results))
-    return frame.key.endswith(within.removesuffix(frame.suffix))
 
 
 def _is_same(one: Path, other: Path) -> bool:

@@ -30,7 +30,10 @@ Value = TypeVar("Value")
 
 
 def frames_at(
-    places: Iterable[Place], columns: Sequence[str] = DEFAULT_COLUMNS, topic: str | None = None
+    places: Iterable[Place],
+    columns: Sequence[str] = DEFAULT_COLUMNS,
+    topic: str | None = None,
+    results: Iterable[Place] = (),
 ) -> Frames:
     """The scans at paths or URLs; those at URLs are without labels.
 
@@ -39,6 +42,7 @@ def frames_at(
             of them URLs.
         columns: Names of the columns of files that do not name them.
         topic: Topic of the bags among them; None where they have only one of clouds.
+        results: Folders or URLs of results, which are passed over in a folder of recordings.
 
     Raises:
         InputError: As :func:`~derain.sources.folders.named_frames` raises it; a store that cannot
@@ -47,7 +51,8 @@ def frames_at(
     places = list(places)
     urls = [str(place) for place in places if is_url(place)]
     if not urls:
-        return named_frames(map(Path, places), columns, topic=topic)
+        here = tuple(Path(folder) for folder in results if not is_url(folder))
+        return named_frames(map(Path, places), columns, topic=topic, results=here)
     if len(urls) < len(places):
         other = next(place for place in places if not is_url(place))
         raise InputError(
@@ -57,7 +62,8 @@ def frames_at(
         )
     with mirror() as lent, changed_warnings(lent.with_urls):
         listing = _Listing(lent, (stored for url in urls for stored in listed(url)))
-        finder = FrameFinder(columns, topic=topic, frames_of_bag=listing.bag)
+        stored = tuple(lent.path_of(str(folder)) for folder in results if is_url(folder))
+        finder = FrameFinder(columns, topic=topic, results=stored, frames_of_bag=listing.bag)
         return listing.stored(finder.frames([lent.path_of(url) for url in urls]))
 
 

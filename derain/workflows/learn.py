@@ -60,7 +60,7 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
         InputError: Too few scans, or too few that can be labelled; a folder that holds something
             else; nothing to be learnt; or what a step raises. No model is left then.
     """
-    source = named_frames(config.recordings, config.columns)
+    source = named_frames(config.recordings, config.columns, topic=config.topic)
     if len(source) < FEWEST_SCANS:
         scans = "1 scan" if len(source) == 1 else f"{len(source)} scans"
         raise InputError(
@@ -79,7 +79,13 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
     with recorded_warnings() as warnings:
         poses = _find_poses(config, source, steps)
         teacher = over_recording(load_method(*named_method(config.teacher)))
-        found = named_frames(config.recordings, config.columns, labelled=True, recordings=True)
+        found = named_frames(
+            config.recordings,
+            config.columns,
+            labelled=True,
+            recordings=True,
+            topic=config.topic,
+        )
         recording = placed(found, poses)
         _teach(config, teacher, recording, steps, warnings)
         data = Taught(str(config.taught))
@@ -123,14 +129,16 @@ def commands(config: LearnConfig, student: Student, source: Source, poses: str |
         source: The scans.
         poses: Poses that the teacher is given; None for those beside the scans.
     """
-    scans, columns = [*map(str, config.recordings)], ("--columns", ",".join(config.columns))
+    scans = [*map(str, config.recordings)]
+    topic = () if config.topic is None else ("--topic", config.topic)
+    reading = (*topic, "--columns", ",".join(config.columns))
     taught = str(config.taught)
     steps: list[Sequence[str]] = []
     if config.needs_odometry(source):
-        steps += [("odometry", *scans, "--out", str(_poses_file(config, source)), *columns)]
+        steps += [("odometry", *scans, "--out", str(_poses_file(config, source)), *reading)]
     pose_options = () if poses is None else ("--poses", poses)
     steps += [
-        ("teach", config.teacher, *scans, "--out", taught, *pose_options, *columns),
+        ("teach", config.teacher, *scans, "--out", taught, *pose_options, *reading),
         ("fit", *fit_options(student.config, _settings(config, student))),
         ("export", str(config.checkpoint), "--out", str(config.out)),
     ]

@@ -51,6 +51,7 @@ class LearnConfig:
         start: The trained model whose weights the network begins with. None draws them at random
             where a network is named, or one without intensity is wanted, and else begins with
             the model that comes with derain.
+        topic: Topic of the bags; None where each has only one of clouds.
     """
 
     recordings: Sequence[Path]
@@ -64,6 +65,7 @@ class LearnConfig:
     epochs: int | None = None
     card: str | None = None
     start: str | None = None
+    topic: str | None = None
 
     @property
     def begins_with(self) -> str | None:

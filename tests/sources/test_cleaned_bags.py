@@ -285,3 +285,15 @@ def test_bags_of_one_name_in_a_folder_of_recordings_are_written_apart(
     for name in ("a", "b"):
         made = bag_path(tmp_path / "out" / name, storage)
         assert read_bag(made) == read_bag(bag_path(tmp_path / "once", storage))
+
+
+def test_a_bag_is_not_written_over_the_results_of_a_folder_of_its_name(
+    tmp_path: Path, run_derain
+) -> None:
+    fleet = tmp_path / "fleet/2024"
+    (fleet / "drive").mkdir(parents=True)
+    np.zeros((4, 4), "<f4").tofile(fleet / "drive/0.bin")
+    storage_file(small_bag(tmp_path, "mcap")).rename(fleet / "drive.mcap")
+    outcome = run_derain(*RUN, tmp_path / "fleet", "--out", tmp_path / "out")
+    assert outcome.code == 2
+    assert "a bag of that name" in outcome.err

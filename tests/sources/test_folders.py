@@ -23,7 +23,6 @@ from derain.sources.folders import (
     source_of,
 )
 from derain.sources.frame import MemoryFrame
-from derain.sources.sink import FolderSink
 
 REHEARSE3D = Layout(scans="lidar_radar_pcd", labels="lidar_radar_labels", lidar="innoviz")
 DRIVES = Layout(sequences="drives", scans="lidar", labels="truth")
@@ -246,12 +245,56 @@ def test_one_sequence_is_no_folder_of_recordings_to_what_takes_no_data_sets(flee
         named_frames(fleet, layouts=())
 
 
-def test_results_among_the_recordings_are_not_cleaned_once_more(fleet: Path) -> None:
-    touch(fleet / "cleaned/2024/a/0.pcd")  # of a run that kept no records
-    source = named_frames(fleet)
-    results = fleet / "cleaned"
-    for sink in (FolderSink(results), FolderSink(fleet / "other", removed=results)):
-        with pytest.raises(InputError) as caught:
-            sink.refuse_clashes(source)
-        assert caught.value.subject == str(fleet / "cleaned/2024/a/0.pcd")
-    FolderSink(fleet / "results").refuse_clashes(source)
+def test_results_among_the_recordings_are_passed_over(fleet: Path) -> None:
+    before = [frame.key for frame in named_frames(fleet)]
+    touch(fleet / "cleaned/2024/a/0.pcd", fleet / "link/0.pcd")  # of a run that kept no records
+    (fleet / "to_results").symlink_to(fleet / "cleaned")
+    results = [fleet / "cleaned", fleet / "link"]
+    assert [frame.key for frame in named_frames(fleet, results=results)] == before
+    assert len(named_frames(fleet)) == len(before) + 2
+
+
+def test_simulated_data_is_found_though_it_has_records(fleet: Path) -> None:
+    touch(fleet / "results/manifest.json")
+    assert "results/0" in [frame.key for frame in named_frames(fleet)]
+
+
+def test_what_a_link_leads_to_is_found_once(tmp_path: Path) -> None:
+    touch(tmp_path / "fleet/b/0.bin", tmp_path / "elsewhere/0.bin", tmp_path / "fleet/c/d/0.bin")
+    (tmp_path / "fleet/a_latest").symlink_to(tmp_path / "fleet/b")
+    (tmp_path / "fleet/a_other").symlink_to(tmp_path / "elsewhere")
+    (tmp_path / "fleet/c/above").symlink_to(tmp_path)
+    (tmp_path / "fleet/c/d/loop").symlink_to(tmp_path / "fleet/c")
+    assert [frame.key for frame in named_frames(tmp_path / "fleet")] == [
+        "a_other/0",
+        "b/0",
+        "c/d/0",
+    ]
+
+
+def test_scans_beside_folders_of_scans_hide_none_below_a_folder_of_recordings(
+    tmp_path: Path,
+) -> None:
+    touch(tmp_path / "fleet/day/map.npy", tmp_path / "fleet/day/a/0.bin")
+    assert [frame.key for frame in named_frames(tmp_path / "fleet")] == ["day/map", "day/a/0"]
+
+
+def test_what_was_named_by_itself_is_no_folder_of_recordings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    touch(tmp_path / "set/velodyne/0.bin", tmp_path / "set/velodyne/1.bin")
+    touch(tmp_path / "sets/a/velodyne/0.bin", tmp_path / "sets/other/0.bin")
+    monkeypatch.chdir(tmp_path / "set")
+    assert [frame.key for frame in named_frames(".")] == ["0", "1"]
+    assert capsys.readouterr().err == ""
+    assert [frame.key for frame in named_frames(tmp_path / "sets")] == ["0"]
+    assert f"{tmp_path / 'sets'}: 1 other folder of scans" in capsys.readouterr().err
+
+
+def test_a_recording_that_cannot_be_read_is_passed_over_with_a_warning(
+    fleet: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = [frame.key for frame in named_frames(fleet)]
+    touch(fleet / "2026/drive.bag.active")
+    assert [frame.key for frame in named_frames(fleet)] == before
+    assert "drive.bag.active" in capsys.readouterr().err
