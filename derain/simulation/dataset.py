@@ -46,7 +46,7 @@ def simulate_track(
     *,
     keep: bool = True,
 ) -> bool:
-    """Simulates a data set, or what is missing of it.
+    """Simulates a data set, or its missing parts.
 
     Args:
         root: Folder to write: a new or an empty one, or one that holds part of this very data set.

@@ -14,7 +14,7 @@ from derain.simulation.classes import TrackClass, unpacked
 from derain.simulation.settings import Settings, Share
 
 # Parts of a scan that are lost together: sensors send a scan in 75 (Ouster) to 180 (Velodyne)
-# packets, of which a network drops some in a row.
+# packets, and a network drops some of them in a row.
 SECTORS_OF_A_SCAN = 60
 
 # Two neighbouring returns nearer together than this are of one surface, metres.

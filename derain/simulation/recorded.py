@@ -91,7 +91,7 @@ def _clear_air(
     else:
         reflectivity = np.clip(scan.intensity[row] / full_scale([scan]), 0, 1).astype(np.float64)
     needed = sensor.detection_threshold * range_**2
-    # What is drawn is at least 0 and less than 1, so that nothing is divided by 0.
+    # The random numbers are at least 0 and less than 1, so there is no division by 0.
     excess = 1 / (1 - generator.random(len(row)))
     reflectivity = np.where(reflectivity < needed, needed * excess, reflectivity)
     return Returns(
@@ -154,8 +154,8 @@ RANGE_NAMES = ("range", "distance")
 def with_points(scan: Scan, rows: Ints, xyz: Floats) -> Scan:
     """The scan with other coordinates in some rows.
 
-    Columns of coordinates, and of range or distance in whatever unit, get the new values in their
-    own dtype; every other row stays as it is, to the bit.
+    Columns of coordinates, and of range or distance in any unit, get the new values in their own
+    dtype; every other row stays the same, to the bit.
 
     Args:
         scan: The scan.
@@ -175,7 +175,7 @@ def with_points(scan: Scan, rows: Ints, xyz: Floats) -> Scan:
 
 
 def with_intensity(scan: Scan, rows: Ints, intensity: Floats) -> Scan:
-    """The scan with other intensities in some rows; every other row stays as it is, to the bit.
+    """The scan with other intensities in some rows; every other row stays the same, to the bit.
 
     Args:
         scan: A scan with intensities.

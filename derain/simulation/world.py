@@ -38,7 +38,7 @@ STEM = "000000"
 DRAWN_WORLDS = "drawn.yaml"
 
 # A scan with fewer points teaches nothing, and one with a greater share of rain shows weather that
-# no sensor is used in: both are drawn again, at most so many times before the world is refused.
+# no sensor is used in. Both are drawn again, up to a limit; then the world is refused.
 SMALLEST_SCAN = 1000
 LARGEST_SHARE_OF_RAIN = 0.4
 MOST_TRIES = 100
@@ -93,7 +93,7 @@ def draw_scan(world: World, generator: Generator) -> tuple[Scan, dict[str, Any]]
         generator: Random generator.
 
     Returns:
-        The scan, intensities in 0..255, labels TrackClass; and what was drawn, in primitives:
+        The scan, intensities in 0..255, labels TrackClass; and the values drawn, as primitives:
         ``place``, the name of the layout, and the attributes of ``sensor`` and ``precipitation``.
 
     Raises:

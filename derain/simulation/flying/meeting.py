@@ -95,7 +95,7 @@ class Population:
 def covered_share(beam: Floats, particle: Floats, offset: Floats) -> Floats:
     """Share of a beam's cross-section that a particle covers, float64 (M,), in 0..1.
 
-    The area of the lens in which two discs overlap, over that of the first.
+    The area of the lens in which two discs overlap, divided by the area of the first disc.
 
     Args:
         beam: Width of the beam where the particle is, float64 (M,), metres.
@@ -208,7 +208,7 @@ def _jittered(
     measured = distance + spread * generator.normal(size=len(distance))
     # Between the sensor's limits, and not behind the surface that ends the beam.
     measured = np.maximum(np.minimum(measured, reach[particles.beam]), sensor.minimum_range)
-    # The power is that of the true distance.
+    # The power depends on the true distance.
     reflectivity = np.minimum(particles.reflectivity * (measured / distance) ** 2, 1)
     return replace(particles, range=measured, reflectivity=reflectivity)
 

@@ -190,7 +190,7 @@ def _drawn_beam_by_beam(
     if not beam:
         return Particles(np.empty((0, 3)), np.empty(0)), np.empty(0, np.int64)
     rows, along, size = np.concatenate(beam), np.concatenate(distance), np.concatenate(diameter)
-    # Uniform in the disc of the slice's far end, of which the beam has less where it is narrower.
+    # Uniform in the disc at the slice's far end; where the beam is narrower, it covers less of it.
     offset = np.sqrt(generator.random(len(rows))) * (np.concatenate(bound) + size) / 2
     turn = generator.uniform(0, 2 * np.pi, len(rows))
     inside = (offset < (optics.width(along) + size) / 2) & stretch.holds(rows, along)

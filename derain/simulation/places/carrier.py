@@ -182,7 +182,7 @@ def _equipment(distance: Span, floor: float, generator: Generator) -> Parts:
 
     Args:
         distance: Nearest and farthest, metres.
-        floor: What they stand on, metres, in the sensor's frame.
+        floor: Height of the ground that they stand on, metres, in the sensor's frame.
         generator: Random generator.
     """
     for _ in range(generator.poisson(2.5)):
