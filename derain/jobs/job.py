@@ -63,7 +63,7 @@ class Job:
         Raises:
             InputError: The folder is of a job with other options, or cannot be written.
         """
-        # As a reader will see it: tuples are lists there.
+        # JSON turns tuples into lists: compare options as they are read back.
         ours = cls(
             folder,
             json.loads(json.dumps(options)),
@@ -109,7 +109,7 @@ class Job:
 
     @cached_property
     def fingerprint(self) -> str:
-        """Of its options, 16 hexadecimal digits."""
+        """Fingerprint of its options, 16 hexadecimal digits."""
         return sha256(json.dumps(self.options, sort_keys=True).encode()).hexdigest()[:16]
 
     def shard_of(self, units: list[UnitT], shard: Shard | None) -> list[UnitT]:
@@ -163,7 +163,7 @@ class Job:
     def _record_of(self, unit: Unit, content: bytes | None) -> Record | None:
         try:
             record = Record(**_parsed(content))
-        except TypeError:  # none, or that of another version
+        except TypeError:  # no record, or one of another version
             return None
         unchanged = (unit.inputs, self.fingerprint) == (record.inputs, record.options)
         return record if unchanged else None

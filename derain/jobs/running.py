@@ -22,7 +22,7 @@ from derain.jobs.job import Job
 from derain.jobs.unit import Record, Unit
 from derain.system.notices import warn
 
-# At most so many units wait for an earlier one to be reported: their results are kept meanwhile.
+# Largest number of finished units that wait, with their results, for an earlier one to be reported.
 AHEAD = 1000
 
 
@@ -102,7 +102,7 @@ class Value:
     error: InputError | None = None
 
     def to_json(self) -> Any:
-        """The result, as it is."""
+        """The result, unchanged."""
         return self.content
 
 
@@ -182,7 +182,7 @@ class Task(Generic[UnitT, ResultT]):
             while True:
                 began = time.perf_counter()
                 result = next(pending, None)
-                seconds += time.perf_counter() - began  # and not what is done with it meanwhile
+                seconds += time.perf_counter() - began  # without the caller's own work
                 if result is None:
                     break
                 results.append(result)
@@ -361,7 +361,7 @@ def _awaited(task: Task[UnitT, ResultT], unit: UnitT, future: Any) -> Sequence[R
         raise
     except InputError as error:
         return task.fail(unit, error)
-    except Exception as error:  # whatever the executor's own processes raise
+    except Exception as error:  # the executor's own processes may raise anything
         reason = f"its worker failed ({type(error).__name__}: {error})"
         return task.fail(unit, InputError(unit.id, reason, "See the log of the worker."))
 

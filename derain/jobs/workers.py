@@ -36,7 +36,7 @@ def processes(count: int) -> Iterator["WorkerPool | None"]:
 
 
 class WorkerPool(ThreadPoolExecutor):
-    """Processes of this machine, each of which runs one task after the other.
+    """Processes of this machine; each runs one task after the other.
 
     If a process dies, for instance because memory is full, a new one runs its task again. A task
     whose process always dies fails with an InputError, and the other tasks go on.
@@ -128,7 +128,7 @@ class _Worker:
         return answer
 
     def kill(self) -> None:
-        """Ends the process at once, whatever it does."""
+        """Ends the process at once, also during a task."""
         with self._lock:
             if self._process is not None:
                 self._process.kill()

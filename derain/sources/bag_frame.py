@@ -40,7 +40,7 @@ class BagFrame(FileFrame):
 
     @property
     def folder(self) -> Path:
-        """The folder of results that a copy of its bag goes to, relative to that of all results."""
+        """The folder of the copy of its bag, relative to the folder of all results."""
         return Path(self.key).parent.parent
 
     @property
@@ -103,7 +103,7 @@ def bag_frames(path: Path, labelled: bool = False, prefix: str = "") -> list[Bag
 
     Raises:
         InputError: A path that leads into no bag; a bag that cannot be read; no such topic or
-            cloud; several topics of clouds, of which none is named.
+            cloud; several topics of clouds, and none is named.
     """
     clouds, number = _clouds_at(path)
     numbers = range(len(clouds)) if number is None else [number]

@@ -106,7 +106,7 @@ class ScanOutcome:
     def to_json(self) -> dict[str, Any]:
         """The outcome of a cleaned scan as the record of its unit has it."""
         cleaned = asdict(self.figures)
-        del cleaned["weather"]  # that of a recording depends on the scans before
+        del cleaned["weather"]  # a recording's weather depends on the scans before
         return {
             "cleaned": cleaned,
             "key": self.frame.key,

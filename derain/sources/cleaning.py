@@ -1,4 +1,4 @@
-"""Cleans the scans of a source, and reports what was done."""
+"""Cleans the scans of a source, and reports the results."""
 
 from collections import Counter
 from contextlib import nullcontext
@@ -117,7 +117,7 @@ def clean(
             processes find all files by the same paths. None does them in this process.
 
     Returns:
-        What was done to each scan, and to all of them.
+        The results of each scan, and of all together.
 
     Raises:
         InputError: No scans, a folder whose files would be overwritten, or a bag that cannot be

@@ -1,4 +1,4 @@
-"""One scan in its sequence: what is known of it before it is read."""
+"""One scan in its sequence: its properties before it is read."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
@@ -139,7 +139,7 @@ class Frame(ABC):
 
     @abstractmethod
     def size(self) -> int:
-        """Bytes of what is read of it.
+        """Number of bytes to read.
 
         Raises:
             InputError: A file that is not there.
@@ -162,7 +162,7 @@ class Frame(ABC):
         return replace(self, label_path=None)
 
     def with_pose(self, pose: NDArray[np.float64]) -> Self:
-        """The same frame at a given pose, whatever lies beside the scan.
+        """The same frame at a given pose, in place of a pose in a file beside the scan.
 
         Args:
             pose: Sensor to world, float64 (4, 4), metres.
@@ -172,7 +172,7 @@ class Frame(ABC):
     def with_intensity_times(self, factor: float) -> Self:
         """The same frame, whose intensities are read in another unit.
 
-        What is written of the scan is as it was in its file: see
+        Written scans keep the intensities of their file: see
         :meth:`derain.scan.Scan.with_intensity_times`.
 
         Args:

@@ -88,7 +88,7 @@ def answers(method: Method, frames: Iterable[Frame]) -> Iterator[AnswerOrError]:
         frames: Frames in time order, one sequence after the other.
 
     Yields:
-        Each frame as soon as it is judged or met by an error.
+        Each frame as soon as it is judged, or has failed with an error.
     """
     last = None
     for frame in frames:

@@ -19,8 +19,8 @@ from derain.system.stopwatch import Stopwatch
 from derain.views.scan_issues import ScanIssue, much_removed
 from derain.views.window import Window
 
-# One scan in so many is examined, the first among them. It takes 3 to 7 milliseconds of 116,000
-# points, a tenth of what a filter takes; the scans of one sensor mostly have the same fault.
+# The first scan is examined, and then one in this number. It takes 3 to 7 milliseconds for 116,000
+# points, a tenth of a filter's time; the scans of one sensor mostly have the same fault.
 EXAMINE_EVERY = 100
 
 
@@ -40,9 +40,9 @@ class Method(ABC):
     :func:`derain.sources.judging.judgements` does it.
 
     Attributes:
-        EXAMINE_EVERY: One scan in so many is examined for what :meth:`issues` gives.
-        warns: True if it warns of that, by :class:`~derain.errors.ScanWarning`. What prints the
-            issues itself sets it to False.
+        EXAMINE_EVERY: One scan in this number is examined for :meth:`issues`.
+        warns: True to warn of issues, by :class:`~derain.errors.ScanWarning`. Callers that print
+            the issues themselves set it to False.
     """
 
     EXAMINE_EVERY: ClassVar[int] = EXAMINE_EVERY
@@ -95,8 +95,8 @@ class Method(ABC):
     def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
         """Ends a recording: answers for the frames that still wait, with the scans that there are.
 
-        What is pushed afterwards is of another recording. Where one of those that wait cannot be
-        judged, those after it go on waiting.
+        Frames pushed afterwards belong to another recording. If a waiting frame cannot be judged,
+        the frames after it keep waiting.
 
         Args:
             stopwatch: Takes the times of the stages.
@@ -137,7 +137,7 @@ class Method(ABC):
         """Number of scans around one on which its answer depends.
 
         Args:
-            recording: Frames of which each follows the one before it.
+            recording: Frames; each follows the one before it.
 
         Returns:
             Numbers of scans before and after; None where it may depend on all of them, as here.

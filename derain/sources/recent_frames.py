@@ -72,7 +72,7 @@ class RecentFrames:
     def __init__(self, window: Window) -> None:
         self.window = window
         self._kept: deque[tuple[Frame, PlacedScan]] = deque()
-        self._given = 0  # so many of those kept were given back, and are there for later ones
+        self._given = 0  # number of kept frames already returned; later frames still need them
 
     @property
     def waiting(self) -> int:

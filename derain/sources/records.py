@@ -68,7 +68,7 @@ class Records:
         return " ".join(stamp_of(path) for path in places if path is not None and is_file(path))
 
     def __reduce__(self) -> tuple[Callable[[Path], "Records"], tuple[Path]]:
-        return records_of, (self.folder,)  # what is read stays where it was read
+        return records_of, (self.folder,)  # a copy in another process reads them again
 
     @cached_property
     def _times(self) -> NDArray[np.float64] | None:

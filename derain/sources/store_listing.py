@@ -23,7 +23,7 @@ from derain.stores.objects import StoredObject, listed
 from derain.stores.url import Place, is_url, without_secrets
 from derain.system.notices import changed_warnings
 
-# What is read to list scans and bags, or for the times and poses of scans.
+# Files that are fetched to list scans and bags, or for the times and poses of scans.
 READ_WHEN_LISTED = (*RECORDS, BAG_METADATA)
 
 Value = TypeVar("Value")
@@ -66,8 +66,8 @@ class _Listing:
 
     Args:
         lent: An empty mirror.
-        objects: The objects; hidden ones are passed over, but for the file that shows a folder to
-            have records of a job.
+        objects: The objects. Hidden ones are skipped, except the file that marks a folder with
+            records of a job.
     """
 
     def __init__(self, lent: Mirror, objects: Iterable[StoredObject]) -> None:

@@ -34,7 +34,7 @@ class StoredFrame(FileFrame):
 
     @abstractmethod
     def fetched(self, where: Mirror) -> list[FileFrame]:
-        """The frames that it stands for, of which all is on this machine.
+        """The frames that it stands for, with all their files on this machine.
 
         Args:
             where: Place of its objects.
@@ -159,7 +159,7 @@ class StoredBag(StoredFrame):
         return f"{super().stamp()} {poses}"
 
     def cloud(self, key: str, name: str, seconds: float | None) -> Self:
-        """One of its clouds, of which only that is known.
+        """One of its clouds, by its key, name and time alone.
 
         Args:
             key: Its key.

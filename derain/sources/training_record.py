@@ -14,7 +14,7 @@ from derain.spec import Spec
 # What a record holds: names of sequences, and fingerprints of scans.
 SEQUENCES, SCANS = "sequences", "scans"
 
-# A Spec is a small document: of more scans than these, so many are recorded, evenly spread.
+# A Spec is a small document: of more scans than these, this number is recorded, evenly spread.
 MOST_NAMES = 2000
 
 

@@ -49,7 +49,7 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
             for outcome in self._knowing_clouds(unit, here).clean(here, sink):
                 if outcome.error is not None:
                     outcome = replace(outcome, error=with_urls(outcome.error))
-                if self.destination.is_stored:  # what is not uploaded yet is not done
+                if self.destination.is_stored:  # a scan is done once it is uploaded
                     held.append(outcome)
                 else:
                     yield outcome
@@ -86,7 +86,7 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
             )
 
     def look(self) -> IsThere[FrameUnit, ScanOutcome]:
-        """Looks at what is written by now."""
+        """Looks up the results written so far."""
         stamps = self.destination.stamps()
 
         def is_there(unit: FrameUnit, outcomes: list[ScanOutcome]) -> bool:

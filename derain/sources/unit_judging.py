@@ -52,7 +52,7 @@ class UnitJudging(Work[FrameUnit, ResultT]):
         """The result of a scan that failed."""
 
     def failed(self, unit: FrameUnit, error: InputError) -> ResultT:
-        """The result of a unit that failed as a whole, which is that of its first scan."""
+        """The result of a unit that failed as a whole: the failure of its first scan."""
         return self.failure(unit.frames[0], error)
 
     def results(
@@ -93,7 +93,7 @@ class UnitJudging(Work[FrameUnit, ResultT]):
             yield frame, none, Stopwatch()
 
     def placed(self, unit: FrameUnit) -> tuple[FrameUnit, Mapping[str, Sequence[ScanIssue]]]:
-        """The unit with poses, and what is odd about them, by the keys of the frames."""
+        """The unit with poses, and the issues of the poses, by the keys of the frames."""
         if self.placing is None:
             return unit, {}
         issues = {}

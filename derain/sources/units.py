@@ -119,7 +119,7 @@ class FrameUnit(Unit):
 
         Raises:
             InputError: A scan or a bag of a store cannot be fetched whole. Then nothing of the unit
-                is done, for what is found of one scan may depend on the others.
+                is done, because the result of one scan may depend on the others.
         """
         frames = (*self.before, *self.frames, *self.after)
         stored = [frame for frame in frames if isinstance(frame, StoredFrame)]
@@ -141,8 +141,8 @@ class FrameUnit(Unit):
 def units_of(source: Sequence[Frame], method: Method | None, block: int = BLOCK) -> list[FrameUnit]:
     """Splits a source so that the method judges each unit as it would judge the whole source.
 
-    A bag is one unit, for it is written as a whole, and so is a recording of which every scan may
-    depend on all others. Other recordings are split into blocks of scans.
+    A bag is one unit, because it is written as a whole. A recording is one unit if the result of
+    each scan may depend on all others. Other recordings are split into blocks of scans.
 
     Args:
         source: Frames in time order, one recording after the other.

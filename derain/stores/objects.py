@@ -156,7 +156,7 @@ def tried(url: str, request: Callable[[], Result]) -> Result:
     for wait in (*WAITS, None):
         try:
             return request()
-        except Exception as error:  # of whatever library the store's file system is made of
+        except Exception as error:  # each library of a store raises its own kinds
             if wait is None or _is_final(url, error):
                 # From None: what the library's error holds may be secret.
                 raise _refusal(url, error) from None

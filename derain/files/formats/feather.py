@@ -79,7 +79,7 @@ class Feather(Format):
         require(content.path, FLATBUFFERS)
         if not content.data.startswith(_MAGIC):
             raise ValueError("it does not begin as Feather version 2 does")
-        # As a stream, so that what is read are the messages that were checked.
+        # Read as a stream, so that PyArrow reads exactly the checked messages.
         stream = content.data[len(_MAGIC) :]
         compression = _check_messages(arrow, stream, content.budget)
         with arrow.ipc.open_stream(stream) as messages:
@@ -125,9 +125,9 @@ class Feather(Format):
 
 
 def _check_messages(arrow: ModuleType, stream: bytes, budget: MemoryBudget) -> str:
-    """Takes room for what compressed messages of a stream expand to.
+    """Reserves memory for the expanded messages of a compressed stream.
 
-    PyArrow allocates whatever they state.
+    PyArrow allocates any size that they state.
 
     Args:
         arrow: PyArrow.
