@@ -139,7 +139,7 @@ def temporary_folder(folder: Path) -> Iterator[Path]:
 def _make_locked(folder: Path) -> int | None:
     """Makes a folder, and returns the descriptor that holds its lock.
 
-    None where no folder can be opened, and so none is taken for abandoned.
+    None if no folder can be opened; then no folder counts as abandoned.
     """
     while True:
         folder.mkdir()

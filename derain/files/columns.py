@@ -117,9 +117,9 @@ def columns_of(scan: Scan) -> dict[str, NDArray[Any]]:
         scan made in memory. Coordinates held in one `xyz` array come out as x, y and z, which every
         format can hold.
     """
-    of_memory = {"xyz": scan.xyz, "intensity": scan.intensity}
+    from_memory = {"xyz": scan.xyz, "intensity": scan.intensity}
     columns: dict[str, NDArray[Any]] = {}
-    for name, column in (scan.fields or of_memory).items():
+    for name, column in (scan.fields or from_memory).items():
         if name == "xyz" and column is not None:
             columns |= {axis: column[:, place] for place, axis in enumerate("xyz")}
         elif column is not None:

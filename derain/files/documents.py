@@ -294,12 +294,12 @@ class Entry:
 
 
 def shown(value: Any) -> str:
-    """A value as a message shows it: cut where it is long, however large it is."""
+    """A value for a message, shortened if it is long."""
     return _SHORT.repr(value)
 
 
 def short(text: str) -> str:
-    """A text as a message shows it, without quotes and cut where it is long."""
+    """A text for a message, without quotes and shortened if it is long."""
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 

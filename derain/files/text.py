@@ -36,7 +36,7 @@ def filled_lines(data: bytes, start: int = 0, count: int = sys.maxsize) -> Itera
 def parse_rows(
     data: bytes, row: np.dtype[Any], start: int = 0, count: int = sys.maxsize
 ) -> NDArray[Any]:
-    """Reads one structured value per line of numbers; empty lines are passed over.
+    """Reads one structured value per line of numbers; empty lines are skipped.
 
     Args:
         data: The text.

@@ -54,7 +54,7 @@ class Result(Protocol):
 UnitT = TypeVar("UnitT", bound=Unit)
 ResultT = TypeVar("ResultT", bound=Result)
 
-# Whether everything is there that a unit wrote, by its results.
+# Returns True if all files that a unit wrote exist, by its results.
 IsThere = Callable[[UnitT, list[ResultT]], bool]
 
 
@@ -137,7 +137,7 @@ class Task(Generic[UnitT, ResultT]):
     Attributes:
         job: The job; None keeps no records.
         work: The work for each unit.
-        folder: The folder that relative paths begin in; None where there are none.
+        folder: The folder that relative paths start from; None if there are none.
         version: The version of derain that began it.
     """
 
@@ -163,7 +163,7 @@ class Task(Generic[UnitT, ResultT]):
         self.work.check()
 
     def done(self, units: Sequence[UnitT]) -> Iterator[tuple[UnitT, list[ResultT] | None]]:
-        """The results of each unit by its record; None where it is to be done."""
+        """The results of each unit by its record; None for a unit to be done."""
         if self.job is None:
             yield from ((unit, None) for unit in units)
             return
@@ -175,7 +175,7 @@ class Task(Generic[UnitT, ResultT]):
             yield unit, results if results is not None and is_there(unit, results) else None
 
     def do(self, unit: UnitT) -> Iterator[ResultT]:
-        """Does a unit and yields its results; its record is there at the end."""
+        """Does a unit and yields its results, and writes its record at the end."""
         seconds, results = 0.0, []
         pending = self.work.do(unit)
         try:
@@ -253,7 +253,7 @@ def run(
             for result in task.do(unit) if done is None else done:
                 yield UnitResult(unit, result, done is not None)
     else:
-        yield from _by(executor, task, units)
+        yield from _run_on_executor(executor, task, units)
 
 
 def completed(task: Task[UnitT, ResultT], units: Sequence[UnitT]) -> list[ResultT] | None:
@@ -316,11 +316,11 @@ def values(
         )
     if len(shard) == len(units):
         return found
-    of_all = completed(task, units)
-    return None if of_all is None else [each.content for each in of_all]
+    results_of_units = completed(task, units)
+    return None if results_of_units is None else [each.content for each in results_of_units]
 
 
-def _by(
+def _run_on_executor(
     executor: Submits, task: Task[UnitT, ResultT], units: Sequence[UnitT]
 ) -> Iterator[UnitResult[UnitT, ResultT]]:
     pickled = pickle.dumps(task)
@@ -338,12 +338,12 @@ def _next_results(
     task: Task[UnitT, ResultT], waiting: deque[tuple[UnitT, list[ResultT] | None, Any]]
 ) -> Iterator[UnitResult[UnitT, ResultT]]:
     unit, done, future = waiting.popleft()
-    for result in _awaited(task, unit, future) if done is None else done:
+    for result in _await_results(task, unit, future) if done is None else done:
         yield UnitResult(unit, result, done is not None)
 
 
-def _awaited(task: Task[UnitT, ResultT], unit: UnitT, future: Any) -> Sequence[ResultT]:
-    """The results of a unit that is handed out.
+def _await_results(task: Task[UnitT, ResultT], unit: UnitT, future: Any) -> Sequence[ResultT]:
+    """Waits for the results of a submitted unit.
 
     Raises:
         InputError: As for :func:`run`.

@@ -157,8 +157,8 @@ class SplitSequences(ABC):
 
 def _check_count(name: str, count: int, least: int) -> None:
     if not least <= count <= MOST:
-        few_or_many = "few" if count < least else "many"
-        raise InputError(name, f"{shown(count)} is too {few_or_many}", f"Give {least} to {MOST:,}.")
+        amount = "few" if count < least else "many"
+        raise InputError(name, f"{shown(count)} is too {amount}", f"Give {least} to {MOST:,}.")
 
 
 @dataclass(frozen=True)

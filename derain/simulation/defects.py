@@ -77,7 +77,7 @@ class Defects(Settings):
         merged = _merged(returns, row[~apart], beside[~apart], share[~apart])
         if not dual:
             return merged
-        return _with_both(merged, row[apart], returns.take(beside[apart]), share[apart])
+        return _with_second_returns(merged, row[apart], returns.take(beside[apart]), share[apart])
 
     def received(self, returns: Returns, shape: tuple[int, int], generator: Generator) -> Bools:
         """True for returns that are not lost, bool (N,).
@@ -145,8 +145,8 @@ def _merged(returns: Returns, row: Ints, beside: Ints, share: Floats) -> Returns
     return Returns(*columns, returns.beam)
 
 
-def _with_both(returns: Returns, row: Ints, second: Returns, share: Floats) -> Returns:
-    """Gives the beams of some rows a second return, with a share of what it would be by itself."""
+def _with_second_returns(returns: Returns, row: Ints, second: Returns, share: Floats) -> Returns:
+    """Adds a second return to the beams of some rows; the two returns share the beam's power."""
     first = returns.reflectivity.copy()
     first[row] *= 1 - share
     both = [

@@ -32,7 +32,7 @@ LARGEST_MANIFEST = 2**26
 
 
 def read_manifest(root: Path) -> dict[str, Any]:
-    """The manifest of a simulated data set, finished or not; empty where there is none.
+    """The manifest of a simulated data set, finished or not; empty if there is none.
 
     Returns:
         As far as the file has them: ``split``, lists of sequences by part; ``rain_rate_mm_h``, by

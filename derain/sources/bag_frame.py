@@ -99,7 +99,7 @@ def bag_frames(path: Path, labelled: bool = False, prefix: str = "") -> list[Bag
         path: A bag; a topic in it, ``bag/topic``; or one of its clouds, ``bag/topic/000012`` or
             ``bag/000012``.
         labelled: True if frames have their labels: ``<stem of the bag>.labels/000012.label``.
-        prefix: First part of all keys; empty where the bag is the only one.
+        prefix: First part of all keys; empty if the bag is the only one.
 
     Raises:
         InputError: A path that leads into no bag; a bag that cannot be read; no such topic or
@@ -151,7 +151,7 @@ def clouds_at(path: Path) -> CloudTopic:
 
 
 def _clouds_at(path: Path) -> tuple[CloudTopic, int | None]:
-    """The clouds that a path leads to, and which of them it names."""
+    """The clouds at a path, and the number of the one that it names."""
     found = split(path)
     if found is None:
         raise InputError(path, "there is no such file or folder", "Check the path.")

@@ -110,7 +110,7 @@ def clean(
         weather: Options for measuring the weather.
         observer: Follows the cleaning.
         division: Division of the scans into units. Where there are more scans than a block has,
-            a record of each unit is kept in the folder, from which a run that was stopped resumes.
+            the folder keeps a record of each unit, and a run resumes from them after a stop.
             None keeps no records, unless there is an executor, or a source or a sink in an object
             store.
         executor: Does the units: an executor of :mod:`concurrent.futures` or the like, whose

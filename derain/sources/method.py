@@ -84,7 +84,7 @@ class Method(ABC):
             stopwatch: Takes the times of the stages, such as read, view, network and back.
 
         Returns:
-            The judgement of the frame that has all of its window by now; None until there is
+            The judgement of the frame whose window is now complete; None until there is
             one.
 
         Raises:
@@ -114,18 +114,18 @@ class Method(ABC):
         """
 
     def with_warnings(self, judgement: Judgement) -> Judgement:
-        """Returns a judgement, after a warning of each kind of fault that no scan had before."""
+        """Returns a judgement, and warns of each kind of issue that no scan had before."""
         if not self.warns:
             return judgement
-        odd = [*much_removed(judgement.share_of_rain)]
+        issues = [*much_removed(judgement.share_of_rain)]
         if self._scans_checked % self.EXAMINE_EVERY == 0:
-            odd += self.issues(judgement)
+            issues += self.issues(judgement)
         self._scans_checked += 1
-        for issue in odd:
+        for issue in issues:
             if issue.kind not in self._warned_of:
                 self._warned_of.add(issue.kind)
                 text = f"{judgement.scan.name}: {issue.detail}"
-                warnings.warn(text, ScanWarning, stacklevel=_level_of_the_user())
+                warnings.warn(text, ScanWarning, stacklevel=_stack_level_of_caller())
         return judgement
 
     @cached_property
@@ -140,7 +140,7 @@ class Method(ABC):
             recording: Frames; each follows the one before it.
 
         Returns:
-            Numbers of scans before and after; None where it may depend on all of them, as here.
+            Numbers of scans before and after; None if it may depend on all of them, as here.
         """
         return None
 
@@ -159,7 +159,7 @@ class Method(ABC):
         """
 
 
-def _level_of_the_user() -> int:
+def _stack_level_of_caller() -> int:
     """The level of the stack, as warnings.warn counts from who calls this, outside derain."""
     level, frame = 1, sys._getframe(1)
     while frame.f_back and frame.f_globals.get("__name__", "").startswith("derain."):

@@ -143,7 +143,7 @@ def line_of(record: Path, lines: int, scan: str, place: int | None, scans: int) 
         record: The record, for messages.
         lines: Number of lines that it has.
         scan: Name of the scan's file.
-        place: The scan's place among all of its sequence; None where it is not one of them.
+        place: The scan's place among all of its sequence; None if it is not one of them.
         scans: Their number.
 
     Raises:

@@ -87,13 +87,13 @@ class FolderSink:
     def write(
         self, frame: Frame, scan: Scan | None, label: NDArray[Any], removed: Scan | None = None
     ) -> None:
-        """Writes the scans, then the labels: where there are labels, the scans are complete.
+        """Writes the scans, then the labels: if the labels exist, the scans are complete.
 
         Args:
             frame: The frame.
             scan: The cleaned scan; None where only labels are of interest.
             label: Class ids or a bool mask of the scan that the labels are for, (N,).
-            removed: The removed points of the scan; None where it is dropped.
+            removed: The removed points of the scan; None if they are dropped.
 
         Raises:
             InputError: It cannot be written.
@@ -142,7 +142,7 @@ class LabelSink(FolderSink):
     """
 
     def refuse_clashes(self, source: Iterable[Frame]) -> None:
-        """Refuses to overwrite labels that are there, or one result by another."""
+        """Refuses to overwrite existing labels, or one result by another."""
         frames = list(source)
         # Not Path.is_file, which raises where the name has become too long by its suffix.
         there = {os.path.realpath(label) for label in _labels_of(frames) if os.path.isfile(label)}
@@ -157,7 +157,7 @@ class LabelSink(FolderSink):
         super().refuse_clashes(frames)
 
     def _refuse_own_files(self, frame: FileFrame) -> None:
-        """No scan is written, and of labels only those matter that are there."""
+        """Checks existing labels alone, because no scan is written."""
 
 
 def _is_result(frame: FileFrame, folder: Path) -> bool:

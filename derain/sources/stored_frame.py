@@ -107,8 +107,8 @@ class StoredBag(StoredFrame):
     """All clouds of a topic of a bag in an object store, which are not known before it is fetched.
 
     Attributes:
-        inner: The topic, as a part of a path; empty where the bag has only one of clouds.
-        prefix: First part of the keys of its clouds; empty where the bag is the only one.
+        inner: The topic, as a part of a path; empty if the bag has only one of clouds.
+        prefix: First part of the keys of its clouds; empty if the bag is the only one.
         seconds: Time of the cloud; None for all clouds.
         trajectory: Poses of the clouds, where they are given.
     """

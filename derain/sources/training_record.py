@@ -67,7 +67,7 @@ def training_overlap(title: str, spec: Spec, card: DataCard, frames: Sequence[Fr
         frames: The scans.
 
     Returns:
-        One sentence; None where it was trained on none of the scans, or nothing is known of it.
+        One sentence; None if it was trained on none of the scans, or nothing is known of it.
 
     Raises:
         InputError: A scan that cannot be read.

@@ -19,8 +19,8 @@ from derain.views.scan_issues import ScanIssue
 
 ResultT = TypeVar("ResultT", bound=Result)
 
-# Finds where the scans of whole recordings were taken: each frame with its pose, in order, and what
-# is odd about it.
+# Finds the poses of whole recordings: returns each frame with its pose, in order, and the issues of
+# the pose.
 Placing = Callable[[Sequence[Frame]], Iterable[tuple[Frame, Sequence[ScanIssue]]]]
 
 
@@ -61,7 +61,7 @@ class UnitJudging(Work[FrameUnit, ResultT]):
         """Judges the scans of a unit, and makes a result of each.
 
         Args:
-            unit: The unit, whose frames have poses by now.
+            unit: The unit; its frames already have poses.
             result: Makes it of a frame, its judgement, and the times of the stages.
         """
         for frame, answer, stopwatch in self.judged(unit):

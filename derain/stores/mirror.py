@@ -93,10 +93,10 @@ def mirror() -> Iterator[Mirror]:
 
 @contextmanager
 def uploaded(place: Place, stamps: dict[str, str]) -> Iterator[Path]:
-    """Lends the folder of a place to be written to.
+    """Provides a folder to write to for a place.
 
     Args:
-        place: A folder, which is lent itself; or a URL, for which a temporary folder is lent, whose
+        place: A folder, which is used itself; or a URL, which gets a temporary folder, whose
             files are uploaded when the block ends well.
         stamps: Receives the sizes and versions of the uploaded files, by path.
 

@@ -52,7 +52,7 @@ class StoredObject:
 
     Attributes:
         url: Its URL, which may hold a signature.
-        size: Bytes; None where the store does not list them.
+        size: Bytes; None if the store does not list them.
         version: Changes when its content does.
     """
 
@@ -195,7 +195,7 @@ def _opened(url: str) -> tuple[Any, str]:
 
 
 def _found(url: str) -> list[StoredObject]:
-    """The object at a URL, or those below it; none where nothing is there."""
+    """The object at a URL, or those below it; an empty list if there is nothing."""
     filesystem, path = _opened(url)
     entries = tried(url, lambda: _entries(filesystem, url, path))
     return [_object(filesystem, entry) for entry in entries]

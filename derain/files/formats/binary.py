@@ -80,7 +80,7 @@ class Binary(Format):
             columns: Names of the values of a row.
 
         Returns:
-            The number; None where the file is not whole rows.
+            The number; None if the file is not whole rows.
 
         Raises:
             InputError: A file that cannot be read.
