@@ -82,10 +82,10 @@ class Work(ABC, Generic[UnitT, ResultT]):
         return lambda unit, results: True
 
     def check(self) -> None:
-        """Refuses a process whose results would differ from those where the job began.
+        """Refuses a process if its results would differ from those of the job's first process.
 
         Raises:
-            InputError: For instance because a file has another content there.
+            InputError: For instance because the process sees another content of a file.
         """
 
 
@@ -376,7 +376,7 @@ def do_unit(pickled: bytes, unit: UnitT) -> list[Any]:
     return list(_task(pickled).do(unit))
 
 
-# The last task of each thread: methods keep what they have seen, so that no two threads share one.
+# The last task of each thread. Methods have state, so no two threads share one.
 _last = threading.local()
 
 

@@ -1,7 +1,7 @@
 """Defects of a scan besides noise: lost and copied returns, range steps, mixed points.
 
-Every return keeps its label, so that none becomes rain or ceases to be; a point between two
-surfaces gets the label of the nearer one.
+Every return keeps its label: no return becomes rain, and no rain becomes something else. A point
+between two surfaces gets the label of the nearer one.
 """
 
 from dataclasses import dataclass, replace
@@ -38,7 +38,7 @@ class Defects(Settings):
         merging: Distance of two surfaces within which a sensor takes them for one, metres.
         range_step: Distances are multiples of it, metres; 0 for any distance.
         copies: Share of the beams with a single return that report it twice: two rows of the scan
-            are the same. A dual sensor whose two returns are one does so with all.
+            are the same. A dual sensor with equal returns copies all of them.
 
     Raises:
         InputError: A value that is impossible.

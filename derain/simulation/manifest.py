@@ -1,7 +1,7 @@
 """The manifest of a simulated data set: its description, and the checksum of every file.
 
-It is written twice: without ``files`` when the work begins, so that a run that is taken up again
-recognises the folder, and with ``files`` when every sequence is there.
+It is written twice: without ``files`` at the start, so that a resumed run recognises the folder,
+and with ``files`` when every sequence is complete.
 """
 
 import hashlib

@@ -223,8 +223,8 @@ def specks(surface: Triangles, sensor: Floats, count: int, generator: Generator)
 
     Args:
         surface: Triangles that they lie on, (T, 3, 3), metres.
-        sensor: Place of the sensor, (3,), metres. The farther a speck is, the larger it is, so that
-            a beam, which widens as well, is returned by it.
+        sensor: Place of the sensor, (3,), metres. Specks grow with distance, as beams widen, so
+            that they still return them.
         count: Their number.
         generator: Random generator.
 

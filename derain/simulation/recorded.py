@@ -25,12 +25,11 @@ USUAL_REFLECTIVITY = 0.1
 def rain_on_scan(scan: Scan, rain: RainField, sensor: Sensor, generator: Generator) -> Scan:
     """Simulates rain on a scan that was recorded in clear air.
 
-    A return stays where it is and gets darker, or a drop in front of it takes its place, or it is
-    lost. A beam that returned nothing may hit a drop; see :func:`find_beams` for how such beams are
-    found. Returns nearer than the sensor's minimum range are the vehicle's own and stay as they
-    are, and so do points of a radar. Two returns of one beam that stand in two rows are treated as
-    returns of two beams, so that such a beam meets twice as many drops. Columns of a second return
-    in the same row stay as they are.
+    A return keeps its place and gets darker, or a drop in front of it takes its place, or it is
+    lost. A beam that returned nothing may hit a drop; :func:`find_beams` finds such beams. Returns
+    nearer than the sensor's minimum range are the vehicle's own and do not change, nor do points of
+    a radar. Two returns of one beam in two rows are treated as returns of two beams, so such a beam
+    meets twice as many drops. Columns of a second return in the same row do not change.
 
     Reflectivity is the intensity as a share of its full scale (1, 255 or 65,535), or a tenth where
     the scan has none. Where all intensities are equal they were not measured: every return keeps

@@ -51,9 +51,9 @@ def find_beams(scan: Scan, generator: Generator) -> RecordedBeams:
       in a rosette.
     - To any other scan a grid is fitted, see :func:`derain.views.grid_fit.fit_grid`. Its empty
       pixels are beams that returned nothing, with an exception: a return that shares its pixel with
-      another has left a pixel of its own empty. So as many empty pixels, chosen at random, are no
-      beams. A sensor that looks one way, and whose returns are in no rows, may have a round field
-      of view: of its pixels only those in the convex hull of the returns are beams.
+      another has left a pixel of its own empty. The same number of empty pixels, chosen at random,
+      are therefore no beams. A sensor that looks one way, with returns in no rows, may have a round
+      field of view: only its pixels in the convex hull of the returns are beams.
 
     Args:
         scan: The scan. Rows that are not valid, or of a radar, are empty cells or no beams.

@@ -97,8 +97,7 @@ def draw_scan(world: World, generator: Generator) -> tuple[Scan, dict[str, Any]]
         ``place``, the name of the layout, and the attributes of ``sensor`` and ``precipitation``.
 
     Raises:
-        InputError: A world of which hardly a scan holds anything but rain, or Open3D cannot be
-            imported.
+        InputError: Nearly every scan of the world holds only rain, or Open3D cannot be imported.
     """
     for _ in range(MOST_TRIES):
         sensor = draw_sensor(world.sensors, generator)

@@ -203,7 +203,7 @@ class CleanedBags:
 
 
 def _whole_topics(source: Iterable[Frame]) -> dict[CloudTopic, Path]:
-    """The topics all of whose clouds are in a source, with the folders of their copies."""
+    """The topics with all their clouds in a source, and the folders of their copies."""
     frames = [frame for frame in source if isinstance(frame, BagFrame)]
     folders = {frame.clouds: frame.folder for frame in frames}
     numbers = Counter(frame.clouds for frame in frames)

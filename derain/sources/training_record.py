@@ -1,4 +1,4 @@
-"""The record of the scans that a network was trained on, so that none is measured unawares.
+"""The record of the scans that a network was trained on, for a warning if it is measured on them.
 
 Sequences of a published data set are recorded by their names, and all other scans by fingerprints
 of their files: folders of different data may be named the same.

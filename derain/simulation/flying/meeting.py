@@ -219,9 +219,9 @@ def draw_haze(
     """Draws what a haze returns: of a share of the beams, exponentially distributed in distance.
 
     The distance to the first of many weak scatterers in an even medium is exponential. Where there
-    are patches, the share of a beam follows a smooth random field over the view, whose mean is the
-    stated share. The power of a return over the threshold is log-uniform. All of it
-    is a modelling choice; what would lie behind the surface that ends the beam is left out.
+    are patches, the share of a beam follows a smooth random field over the view with the stated
+    share as its mean. The power of a return over the threshold is log-uniform. All of it is a
+    modelling choice. Scatterers behind the surface that ends the beam are left out.
 
     Args:
         clear: Return of each beam through clear air.

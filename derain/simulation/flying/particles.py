@@ -129,11 +129,11 @@ class OpenBeams:
 def draw_particles(
     number: float, sizes: Sizes, stretch: Stretch, beams: OpenBeams, generator: Generator
 ) -> tuple[Particles, Meetings]:
-    """Draws particles of an even density that beams meet where they may be.
+    """Draws particles of an even density on the stretches of the beams.
 
-    For each beam they are drawn as if it were alone; a particle within several beams so comes up
-    for each of them. It is kept only for the nearest of those whose stretches it is on. What is
-    kept is the Poisson process of the space that the beams fill together.
+    Particles are drawn for each beam as if it were alone, so a particle within several beams is
+    drawn for each of them. It is kept only for the nearest beam with a stretch at its place. The
+    kept particles are the Poisson process of the space that the beams fill together.
 
     Args:
         number: Particles per cubic metre.
