@@ -1,9 +1,9 @@
-"""Cleans scans with an exported model or a filter: takes rain and snow out of them.
+"""Cleans scans with an exported model or a filter: removes rain and snow.
 
 Writes <stem>.label (1 = rain, one per row of the input) and the scan without its rain, in the
 format of the input with all its fields.
 
-  derain run example --out cleaned            two simulated scans that come along
+  derain run example --out cleaned            two simulated scans that come with derain
   derain run scans/ --out cleaned
   derain run drive/ --out cleaned --poses poses.txt
   derain run model.onnx scan.bin --out cleaned
@@ -28,18 +28,18 @@ METHOD is a model from `derain export` (.onnx), parameters from `derain tune` (.
 (below).
 METHOD is optional: if the first word is a folder or a scan, the model that comes with derain cleans
 all scans. Write ./crf for a folder called crf.
-The model that comes with derain judges the scans of a recording by the scans around them, too:
-solid things are where they were, rain is not. Where the sensor was comes from the poses, or else
-from the scans; where that is not known, or with --alone, each scan is judged by itself.
-Methods that see several scans need the scans of a recording in time order. A point of which a
-method is not sure stays. Results of a data set are named by their paths in it.
+The model that comes with derain compares each scan of a recording with the scans around it: solid
+things stay in place, rain does not. The positions of the sensor come from the poses, or else from
+odometry. Without positions, or with --alone, derain judges each scan by itself.
+Methods that need several scans take the scans of a recording in time order. Points stay if the
+method is not sure of them. Results of a data set have the same paths as its scans.
 A bag (.bag of ROS 1; .mcap, .db3 or a folder of ROS 2) becomes a bag of the same name: the clouds
-of one topic have no rain, and everything else stays the same, byte for byte.
+of one topic lose their rain, and everything else stays the same, byte for byte.
 derain warns once of each fault of the scans. It skips scans with more than --most-removed rain: it
-writes no file for them, and leaves the clouds of bags as they are. It also skips scans that it
-cannot read. The exit code is then 2.
-With --weather, --fail-at, --dry or --json it measures the weather of every scan; otherwise of five
-scans, for the last line.
+writes no file for them, and does not change such clouds of bags. It also skips scans that it cannot
+read. The exit code is then 2.
+With --weather, --fail-at, --dry or --json it measures the weather of every scan. Otherwise it
+measures five scans, for the last line.
 Visibility is the range that 90 % of the rays would reach if rain were as dense everywhere as in the
 first 10 m. It compares scans of one sensor; a weather station measures something else. Fog without
 returns shows only in comparison with dry scans of the sensor (--dry).
@@ -130,10 +130,10 @@ def add_arguments(parser: Parser) -> None:
         "--probability", action="store_true", help=f"add the column {RAIN_PROBABILITY} to the scans"
     )
     parser.add_argument(
-        "--past", type=int, metavar="N", help=f"see N scans before each (default: {PAST})"
+        "--past", type=int, metavar="N", help=f"use N scans before each scan (default: {PAST})"
     )
     parser.add_argument(
-        "--delay", type=int, metavar="N", help=f"see N scans after each (default: {DELAY})"
+        "--delay", type=int, metavar="N", help=f"use N scans after each scan (default: {DELAY})"
     )
     parser.add_argument("--alone", action="store_true", help="judge each scan by itself")
     add_poses(parser)
@@ -161,19 +161,19 @@ def main(arguments: argparse.Namespace) -> int:
     keep_freed_memory()
     name, scans = method_and_scans(arguments.method, arguments.scans or [])
     division = division_of(arguments)
-    alone = method_of(name, arguments)
+    single_scan_method = method_of(name, arguments)
     results = [folder for folder in (arguments.out, arguments.removed) if folder is not None]
     frames = frames_at(scans, arguments.columns, arguments.topic, results)
     source = with_given_poses(frames, arguments).map(
         lambda frame: frame.with_intensity_times(arguments.intensity_scale)
     )
     if arguments.probability:
-        require_probabilities(alone, source)
-    # How many clouds a bag in a store has is known when it is fetched.
+        require_probabilities(single_scan_method, source)
+    # The number of clouds of a bag in a store is known only after fetching it.
     several = len(source) > 1 or isinstance(source[0], StoredBag)
     method, workers = method_and_workers(
-        _over_recording(alone, arguments, several),
-        lambda: _over_recording(method_of(name, arguments), arguments, several),
+        _with_scans_around(single_scan_method, arguments, several),
+        lambda: _with_scans_around(method_of(name, arguments), arguments, several),
         source,
         arguments,
     )
@@ -194,9 +194,9 @@ def main(arguments: argparse.Namespace) -> int:
         printer = _Printer(arguments.out, rows, arguments.json)
         if name == DEFAULT:
             printer.introduce_default()
-        # What does without the scans around each need not be warned of scans that have none.
-        known = (frame for frame in source if not isinstance(frame, StoredBag))
-        for sentence in irregularities(known, alone.window):
+        # Warnings concern methods that cannot work on one scan; a RecordedDerainer can.
+        listed = (frame for frame in source if not isinstance(frame, StoredBag))
+        for sentence in irregularities(listed, single_scan_method.window):
             warn(sentence)
         report = clean(
             source,
@@ -215,20 +215,29 @@ def main(arguments: argparse.Namespace) -> int:
     return code or warn_of_bad_weather(report.weather, arguments.fail_at)
 
 
-def _over_recording(method: Method, arguments: argparse.Namespace, several: bool) -> Method:
-    """The method that sees the scans around each, where the command line or the model asks for it.
+def _with_scans_around(method: Method, arguments: argparse.Namespace, several: bool) -> Method:
+    """Wraps a model to use the scans around each scan, if the options or the model need it.
+
+    Args:
+        method: The method for one scan at a time.
+        arguments: The options.
+        several: True if there are several scans.
+
+    Returns:
+        The wrapped model, or the method itself.
 
     Raises:
-        InputError: Scans around each for a method that is no model, or that is to see one alone.
+        InputError: ``--past`` or ``--delay`` with a method that is no model, or with ``--alone``;
+            ``--alone`` with a method that needs several scans.
     """
-    asked = arguments.past is not None or arguments.delay is not None
-    if arguments.alone and (asked or not method.window.is_one_scan):
-        reason = "excludes --past and --delay, and methods that need the scans around each"
+    is_set = arguments.past is not None or arguments.delay is not None
+    if arguments.alone and (is_set or not method.window.is_one_scan):
+        reason = "excludes --past and --delay, and methods that need several scans"
         raise InputError("--alone", reason, "Leave it out.")
-    if asked and not isinstance(method, Derainer):
+    if is_set and not isinstance(method, Derainer):
         raise InputError("--past, --delay", "are options of models", "Leave them out.")
-    of_itself = isinstance(method, Derainer) and method.spec.network == CUES and several
-    if isinstance(method, Derainer) and (asked or (of_itself and not arguments.alone)):
+    by_default = isinstance(method, Derainer) and method.spec.network == CUES and several
+    if isinstance(method, Derainer) and (is_set or (by_default and not arguments.alone)):
         from derain.export.recorded import RecordedDerainer  # a single scan needs no odometry
 
         past, delay = arguments.past, arguments.delay
@@ -239,7 +248,7 @@ def _over_recording(method: Method, arguments: argparse.Namespace, several: bool
 
 
 class _Printer(CleaningObserver):
-    """Prints what is done to the scans, and makes a row of a table of the weather of each."""
+    """Prints the results, and collects one row of the weather table per scan."""
 
     def __init__(self, out: Place, rows: list[Sequence[object]], as_json: bool) -> None:
         self._out = out
@@ -250,7 +259,7 @@ class _Printer(CleaningObserver):
         self._stream = sys.stderr if as_json else sys.stdout
 
     def introduce_default(self) -> None:
-        """Prints which model cleans the scans where none is named."""
+        """Prints the name of the default model."""
         print_lines(
             f"by the model that comes with derain: {model_card().title}; what it is, and when not "
             f"to use it: derain info {DEFAULT}",
@@ -258,7 +267,7 @@ class _Printer(CleaningObserver):
         )
 
     def summarise(self, report: CleanReport) -> None:
-        """Prints what was done to all scans together."""
+        """Prints the summary of all scans."""
         self._notices.warn_of_repeats()
         if not report.scans and not report.not_cleaned:
             print_lines("no scans in this shard", self._stream)
@@ -270,7 +279,7 @@ class _Printer(CleaningObserver):
             )
 
     def noticed(self, scan: str, odd: list[ScanIssue]) -> None:
-        """Warns of what is odd about a scan."""
+        """Warns of a scan's issues."""
         self._notices.warn(scan, odd)
 
     def cleaned(self, outcome: ScanOutcome) -> None:
@@ -288,5 +297,5 @@ class _Printer(CleaningObserver):
             self._rows.append([scan.scan, outcome.seconds, *row])
 
     def failed(self, error: InputError) -> None:
-        """Prints why a scan is not cleaned."""
+        """Prints the error of a scan that is not cleaned."""
         print_error(error)

@@ -75,7 +75,7 @@ def writing(path: Path) -> Iterator[None]:
 def require_writable(path: Path) -> None:
     """Refuses, before long work, a file that could not be written after it.
 
-    Its folder is made if missing; an existing file stays as it is.
+    Its folder is made if missing; an existing file does not change.
 
     Args:
         path: The file to write later.
@@ -115,8 +115,8 @@ def _target(path: Path) -> Path:
 def temporary_folder(folder: Path) -> Iterator[Path]:
     """Lends an empty hidden folder in another, which is made if missing.
 
-    It is gone when the block ends, with what is in it then. A process that is killed leaves it for
-    :func:`remove_abandoned`.
+    It is removed with its content when the block ends. A killed process leaves it behind, and
+    :func:`remove_abandoned` removes it.
 
     Args:
         folder: The other folder.
@@ -139,7 +139,7 @@ def temporary_folder(folder: Path) -> Iterator[Path]:
 def _make_locked(folder: Path) -> int | None:
     """Makes a folder, and returns the descriptor that holds its lock.
 
-    None where no folder can be opened, and so none is taken for abandoned.
+    None if no folder can be opened; then no folder counts as abandoned.
     """
     while True:
         folder.mkdir()

@@ -60,14 +60,14 @@ def scan_of(
         path: The file.
         fields: Name → column, each of N rows: either `x`, `y` and `z` (N,) or `xyz` (N, 3), metres
             in the sensor frame; `intensity` (or another of INTENSITY_NAMES) and `radar` (not 0 for
-            points of the radar) if there are; and whatever else the file holds. A name in
-            another case counts where no column has exactly this one.
+            points of the radar) if the file has them; and all its other columns. A name in another
+            case counts if no column has exactly this one.
         shape: (height, width) of an organised cloud.
         header: The content of the file besides its columns, for the writer of its format.
 
     Raises:
-        InputError: No coordinates, coordinates that are not numbers, or columns of which several
-            could be meant: see :func:`derain.scan.named`.
+        InputError: No coordinates, coordinates that are not numbers, or several columns that match
+            one name: see :func:`derain.scan.named`.
     """
     flat = _numbers(fields, 1)
     found = (named(flat, name, path) for name in INTENSITY_NAMES)
@@ -85,7 +85,7 @@ def scan_of(
 
 
 def _numbers(fields: Mapping[str, NDArray[Any]], *axes: int) -> dict[str, NDArray[Any]]:
-    """The columns of so many axes that hold numbers."""
+    """The columns that hold numbers and have one of these numbers of axes."""
     return {
         name: column
         for name, column in fields.items()
@@ -117,9 +117,9 @@ def columns_of(scan: Scan) -> dict[str, NDArray[Any]]:
         scan made in memory. Coordinates held in one `xyz` array come out as x, y and z, which every
         format can hold.
     """
-    of_memory = {"xyz": scan.xyz, "intensity": scan.intensity}
+    from_memory = {"xyz": scan.xyz, "intensity": scan.intensity}
     columns: dict[str, NDArray[Any]] = {}
-    for name, column in (scan.fields or of_memory).items():
+    for name, column in (scan.fields or from_memory).items():
         if name == "xyz" and column is not None:
             columns |= {axis: column[:, place] for place, axis in enumerate("xyz")}
         elif column is not None:

@@ -25,12 +25,12 @@ LARGEST_DOCUMENT = 2**20
 # The deepest document of derain, a Spec in a checkpoint's proof, has five levels.
 DEEPEST = 32
 
-# In memory a value takes up to a hundred times the two characters that it may be written with: a
-# document may have one for so many of the bytes that it may have.
+# A value takes up to a hundred times more memory than the two characters that may stand for it.
+# The number of values is therefore limited to one for each of these bytes of the largest document.
 BYTES_PER_VALUE = 16
 
-# What PyYAML raises on bad documents: its own errors, and what Python raises where a tag such as
-# !!int stands before what is no number.
+# Errors of PyYAML on bad documents: its own, and those of Python, for instance where a tag such as
+# !!int stands before a text.
 _YAML_DAMAGE = (
     *(yaml.YAMLError, ValueError, LookupError, TypeError, AttributeError),
     *(ArithmeticError, RecursionError),
@@ -68,7 +68,7 @@ Parsed = TypeVar("Parsed")
 
 
 class _Short(reprlib.Repr):
-    """Cuts what is long; Python refuses to write out whole numbers of thousands of digits."""
+    """Shortens long values; Python refuses to print whole numbers of thousands of digits."""
 
     def repr_int(self, x: int, level: int) -> str:
         return super().repr_int(x, level) if x.bit_length() < 10_000 else "a number of many digits"
@@ -209,7 +209,7 @@ class Entry:
     def numbers(
         self, count: int | None = None, read: Callable[["Entry"], float] | None = None
     ) -> tuple[float, ...]:
-        """A list of so many finite numbers, or of any number of them.
+        """A list of finite numbers, of a given length or of any.
 
         Args:
             count: Length of the list; None allows any.
@@ -294,12 +294,12 @@ class Entry:
 
 
 def shown(value: Any) -> str:
-    """A value as a message shows it: cut where it is long, however large it is."""
+    """A value for a message, shortened if it is long."""
     return _SHORT.repr(value)
 
 
 def short(text: str) -> str:
-    """A text as a message shows it, without quotes and cut where it is long."""
+    """A text for a message, without quotes and shortened if it is long."""
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 

@@ -11,7 +11,7 @@ from derain.scan import to_float32
 
 POSE = ("x", "y", "z", "roll", "pitch", "yaw")
 
-# By how much the product of a rotation and its transpose may differ from the identity, element by
+# Largest difference of the product of a rotation and its transpose to the identity, element by
 # element: the numbers in calibration files are rounded, to four digits or more.
 ROTATION_TOLERANCE = 1e-3
 

@@ -75,7 +75,7 @@ class Format(ABC):
         return True
 
     def count(self, path: Path, columns: Sequence[str]) -> int | None:
-        """Number of points of an uncompressed file where its size is enough to know it, else None.
+        """Number of points of an uncompressed file, if its size determines it, else None.
 
         Args:
             path: The file.

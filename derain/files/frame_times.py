@@ -15,7 +15,7 @@ from derain.files.reading import is_file, read_bytes, reading
 
 METADATA = "metadata.csv"
 
-# Lines for a hundred thousand scans. What is read of a line takes up to forty times its length.
+# Bytes of the lines of a hundred thousand scans. In memory a line takes up to forty times as much.
 LARGEST_METADATA = 2**23
 
 # Names of the columns that hold a scan's name and its time; those of REHEARSE-3D are not published.
@@ -29,8 +29,8 @@ def read_frame_times(
 
     Args:
         scans: The scans, at least one. A line of the ``metadata.csv`` beside them belongs to the
-            scan of that name, whatever its suffix and the zeros before it: 000012.bin, 000012 and
-            12 are one, and so are 1634567.25.bin and 1634567.25.
+            scan of that name. Suffixes and leading zeros do not count: 000012.bin, 000012 and 12
+            are one name, and so are 1634567.25.bin and 1634567.25.
         columns: Names of two columns: the scan's name, and its time.
 
     Returns:

@@ -8,7 +8,7 @@ COMPRESSED = ".gz"
 def scan_stem(scan: Path) -> str:
     """The name of a scan without the suffix of its format, compressed or not.
 
-    Both scan.bin and scan.bin.gz are ``scan``: what is made of a scan is named by it.
+    Both scan.bin and scan.bin.gz are ``scan``: it names the results of a scan.
     """
     return Path(_uncompressed(scan.name)).stem
 

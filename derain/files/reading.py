@@ -52,7 +52,7 @@ def reading(path: Path, *damage: type[Exception]) -> Iterator[None]:
 
 
 def read_bytes(path: Path, largest: int) -> bytes:
-    """The content of a regular file; nothing else is opened, for a pipe or a device may never end.
+    """The content of a regular file. Pipes and devices are not opened, because they may never end.
 
     Args:
         path: The file.

@@ -28,7 +28,7 @@ def encode(text: str) -> bytes:
 
 
 def filled_lines(data: bytes, start: int = 0, count: int = sys.maxsize) -> Iterator[bytes]:
-    """The lines of a text that are not empty: so many of them, after so many that come before."""
+    """The lines of a text that are not empty: ``count`` of them, after ``start`` others."""
     filled = (line for line in io.BytesIO(data) if line.strip())
     return islice(filled, *(min(place, sys.maxsize) for place in (start, start + count)))
 
@@ -36,7 +36,7 @@ def filled_lines(data: bytes, start: int = 0, count: int = sys.maxsize) -> Itera
 def parse_rows(
     data: bytes, row: np.dtype[Any], start: int = 0, count: int = sys.maxsize
 ) -> NDArray[Any]:
-    """Reads one structured value per line of numbers; empty lines are passed over.
+    """Reads one structured value per line of numbers; empty lines are skipped.
 
     Args:
         data: The text.

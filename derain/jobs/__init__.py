@@ -1,1 +1,1 @@
-"""Work in units: what is to be done, a record of what is done, and the processes that do it."""
+"""Work in units: the units of a job, a record of each result, and the processes that do them."""

@@ -81,7 +81,7 @@ def _refuse_other_versions(client: Any) -> None:
     """
     try:
         versions = set(client.run(version).values())
-    except Exception as error:  # of which Dask keeps no more than the text
+    except Exception as error:  # Dask keeps only the text of the original error
         if "No module named" not in str(error):
             raise
         reason = f"its workers cannot import derain ({error})"

@@ -1,4 +1,4 @@
-"""A job in a folder: its options, its units, a record of each unit that is done, and how far it is.
+"""A job in a folder: its options, its units, a record of each unit that is done, and its progress.
 
 They lie beside the results, in the hidden folder ``.derain``: ``job.json``, ``units.json``, and a
 record ``units/<id>.json`` for each unit that is done or failed. Each file is written whole.
@@ -34,7 +34,7 @@ class Job:
         options: Texts, numbers, true or false by name, among them the command and derain's version:
             all of what the results depend on but the inputs.
         shards: Number of shards that it was started in, and a batch system's number of the first;
-            None where it was begun as a whole.
+            None if it was begun as a whole.
     """
 
     folder: Place
@@ -57,13 +57,13 @@ class Job:
             options: The options.
             units: All of its units, which are listed for :meth:`listed`.
             shard: The shard that is done now; None for all of it.
-            anew: True if the records of another job are removed; its results stay until they are
-                written anew.
+            anew: True to remove the records of another job; its results stay until they are
+                overwritten.
 
         Raises:
             InputError: The folder is of a job with other options, or cannot be written.
         """
-        # As a reader will see it: tuples are lists there.
+        # JSON turns tuples into lists: compare options as they are read back.
         ours = cls(
             folder,
             json.loads(json.dumps(options)),
@@ -109,7 +109,7 @@ class Job:
 
     @cached_property
     def fingerprint(self) -> str:
-        """Of its options, 16 hexadecimal digits."""
+        """Fingerprint of its options, 16 hexadecimal digits."""
         return sha256(json.dumps(self.options, sort_keys=True).encode()).hexdigest()[:16]
 
     def shard_of(self, units: list[UnitT], shard: Shard | None) -> list[UnitT]:
@@ -140,7 +140,7 @@ class Job:
             ) from error
 
     def record(self, record: Record) -> None:
-        """Writes the record of a unit, whose results are complete by now.
+        """Writes the record of a unit, after its results are complete.
 
         Raises:
             InputError: It cannot be written.
@@ -148,7 +148,7 @@ class Job:
         self._documents.write(_name(record.unit), json.dumps(asdict(record)))
 
     def records_of(self, units: Sequence[UnitT]) -> Iterator[tuple[UnitT, Record | None]]:
-        """The record of each unit; None where it was not done with these inputs and options.
+        """The record of each unit; None if it was not done with these inputs and options.
 
         Args:
             units: The units.
@@ -163,7 +163,7 @@ class Job:
     def _record_of(self, unit: Unit, content: bytes | None) -> Record | None:
         try:
             record = Record(**_parsed(content))
-        except TypeError:  # none, or that of another version
+        except TypeError:  # no record, or one of another version
             return None
         unchanged = (unit.inputs, self.fingerprint) == (record.inputs, record.options)
         return record if unchanged else None
@@ -241,11 +241,11 @@ def job_status(folder: Place, on_done: Callable[[Record], None]) -> JobStatus:
 
 
 def differences(begun: Mapping[str, Any], now: Mapping[str, Any]) -> str:
-    """Names the options that were others where something began; empty where none was.
+    """Describes the options that differ from those at the start; empty if none does.
 
     Args:
-        begun: The options by which it began.
-        now: Those of now.
+        begun: The options at the start.
+        now: The options of this command.
     """
     names = [*begun, *(name for name in now if name not in begun)]
     return ", ".join(

@@ -22,7 +22,7 @@ from derain.jobs.job import Job
 from derain.jobs.unit import Record, Unit
 from derain.system.notices import warn
 
-# At most so many units wait for an earlier one to be reported: their results are kept meanwhile.
+# Largest number of finished units that wait, with their results, for an earlier one to be reported.
 AHEAD = 1000
 
 
@@ -54,7 +54,7 @@ class Result(Protocol):
 UnitT = TypeVar("UnitT", bound=Unit)
 ResultT = TypeVar("ResultT", bound=Result)
 
-# Whether everything is there that a unit wrote, by its results.
+# Returns True if all files that a unit wrote exist, by its results.
 IsThere = Callable[[UnitT, list[ResultT]], bool]
 
 
@@ -82,10 +82,10 @@ class Work(ABC, Generic[UnitT, ResultT]):
         return lambda unit, results: True
 
     def check(self) -> None:
-        """Refuses a process whose results would differ from those where the job began.
+        """Refuses a process if its results would differ from those of the job's first process.
 
         Raises:
-            InputError: For instance because a file has another content there.
+            InputError: For instance because the process sees another content of a file.
         """
 
 
@@ -102,7 +102,7 @@ class Value:
     error: InputError | None = None
 
     def to_json(self) -> Any:
-        """The result, as it is."""
+        """The result, unchanged."""
         return self.content
 
 
@@ -137,7 +137,7 @@ class Task(Generic[UnitT, ResultT]):
     Attributes:
         job: The job; None keeps no records.
         work: The work for each unit.
-        folder: The folder that relative paths begin in; None where there are none.
+        folder: The folder that relative paths start from; None if there are none.
         version: The version of derain that began it.
     """
 
@@ -163,7 +163,7 @@ class Task(Generic[UnitT, ResultT]):
         self.work.check()
 
     def done(self, units: Sequence[UnitT]) -> Iterator[tuple[UnitT, list[ResultT] | None]]:
-        """The results of each unit by its record; None where it is to be done."""
+        """The results of each unit by its record; None for a unit to be done."""
         if self.job is None:
             yield from ((unit, None) for unit in units)
             return
@@ -175,14 +175,14 @@ class Task(Generic[UnitT, ResultT]):
             yield unit, results if results is not None and is_there(unit, results) else None
 
     def do(self, unit: UnitT) -> Iterator[ResultT]:
-        """Does a unit and yields its results; its record is there at the end."""
+        """Does a unit and yields its results, and writes its record at the end."""
         seconds, results = 0.0, []
         pending = self.work.do(unit)
         try:
             while True:
                 began = time.perf_counter()
                 result = next(pending, None)
-                seconds += time.perf_counter() - began  # and not what is done with it meanwhile
+                seconds += time.perf_counter() - began  # without the caller's own work
                 if result is None:
                     break
                 results.append(result)
@@ -253,7 +253,7 @@ def run(
             for result in task.do(unit) if done is None else done:
                 yield UnitResult(unit, result, done is not None)
     else:
-        yield from _by(executor, task, units)
+        yield from _run_on_executor(executor, task, units)
 
 
 def completed(task: Task[UnitT, ResultT], units: Sequence[UnitT]) -> list[ResultT] | None:
@@ -316,11 +316,11 @@ def values(
         )
     if len(shard) == len(units):
         return found
-    of_all = completed(task, units)
-    return None if of_all is None else [each.content for each in of_all]
+    results_of_units = completed(task, units)
+    return None if results_of_units is None else [each.content for each in results_of_units]
 
 
-def _by(
+def _run_on_executor(
     executor: Submits, task: Task[UnitT, ResultT], units: Sequence[UnitT]
 ) -> Iterator[UnitResult[UnitT, ResultT]]:
     pickled = pickle.dumps(task)
@@ -338,12 +338,12 @@ def _next_results(
     task: Task[UnitT, ResultT], waiting: deque[tuple[UnitT, list[ResultT] | None, Any]]
 ) -> Iterator[UnitResult[UnitT, ResultT]]:
     unit, done, future = waiting.popleft()
-    for result in _awaited(task, unit, future) if done is None else done:
+    for result in _await_results(task, unit, future) if done is None else done:
         yield UnitResult(unit, result, done is not None)
 
 
-def _awaited(task: Task[UnitT, ResultT], unit: UnitT, future: Any) -> Sequence[ResultT]:
-    """The results of a unit that is handed out.
+def _await_results(task: Task[UnitT, ResultT], unit: UnitT, future: Any) -> Sequence[ResultT]:
+    """Waits for the results of a submitted unit.
 
     Raises:
         InputError: As for :func:`run`.
@@ -361,7 +361,7 @@ def _awaited(task: Task[UnitT, ResultT], unit: UnitT, future: Any) -> Sequence[R
         raise
     except InputError as error:
         return task.fail(unit, error)
-    except Exception as error:  # whatever the executor's own processes raise
+    except Exception as error:  # the executor's own processes may raise anything
         reason = f"its worker failed ({type(error).__name__}: {error})"
         return task.fail(unit, InputError(unit.id, reason, "See the log of the worker."))
 
@@ -376,7 +376,7 @@ def do_unit(pickled: bytes, unit: UnitT) -> list[Any]:
     return list(_task(pickled).do(unit))
 
 
-# The last task of each thread: methods keep what they have seen, so that no two threads share one.
+# The last task of each thread. Methods have state, so no two threads share one.
 _last = threading.local()
 
 

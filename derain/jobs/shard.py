@@ -91,7 +91,7 @@ class Shard:
 def shard_numbers(units: Sequence[Unit], count: int) -> dict[str, int]:
     """The shard of each unit, so that all shards are about as large.
 
-    The largest unit comes first, and each goes to the shard that is smallest by then. Only ids and
+    The largest unit comes first, and each goes to the smallest shard so far. Only ids and
     sizes matter, and not the order of the units.
 
     Args:

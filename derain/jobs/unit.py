@@ -1,4 +1,4 @@
-"""A part of a job that one process does by itself, and the record of what was done of it."""
+"""A part of a job that one process does by itself, and the record of its result."""
 
 from dataclasses import dataclass
 from typing import Any

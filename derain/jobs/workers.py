@@ -36,10 +36,10 @@ def processes(count: int) -> Iterator["WorkerPool | None"]:
 
 
 class WorkerPool(ThreadPoolExecutor):
-    """Processes of this machine, each of which runs one task after the other.
+    """Processes of this machine; each runs one task after the other.
 
     If a process dies, for instance because memory is full, a new one runs its task again. A task
-    whose process always dies fails with an InputError, and the other tasks go on.
+    whose process always dies fails with an InputError, and the other tasks continue.
 
     A ``with`` block ends the processes: after an error at once, otherwise when all tasks are done.
 
@@ -128,7 +128,7 @@ class _Worker:
         return answer
 
     def kill(self) -> None:
-        """Ends the process at once, whatever it does."""
+        """Ends the process at once, also during a task."""
         with self._lock:
             if self._process is not None:
                 self._process.kill()
@@ -138,15 +138,15 @@ class _Worker:
     def _start(self) -> "Connection[Any, Any]":
         # Not forked: a fork has the locks of this process, but not the threads that release them.
         context = multiprocessing.get_context("spawn")
-        self._connection, theirs = context.Pipe()
-        self._process = context.Process(target=_serve, args=(theirs,), daemon=True)
+        self._connection, worker_end = context.Pipe()
+        self._process = context.Process(target=_run_tasks, args=(worker_end,), daemon=True)
         with without_main_module():
             self._process.start()
-        theirs.close()  # so that the connection ends with the process
+        worker_end.close()  # so that the connection ends with the process
         return self._connection
 
 
-def _serve(connection: "Connection[Any, Any]") -> None:
+def _run_tasks(connection: "Connection[Any, Any]") -> None:
     """Runs tasks until its process is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal: the parent process ends this one
     end_with_parent()

@@ -41,7 +41,7 @@ class Returns(Columns):
         reflectivity: Apparent reflectivity, float64 (N,), in 0..1: what a surface across the whole
             beam and facing the sensor would need to return as much through clear air. 0 where
             nothing returned.
-        label: TrackClass of what was hit, int64 (N,); 0 where nothing returned.
+        label: TrackClass of the surface that was hit, int64 (N,); 0 where nothing returned.
         beam: Row of the beam in :meth:`derain.simulation.sensor.Sensor.beams`, int64 (N,),
             ascending.
     """
@@ -58,5 +58,5 @@ class Returns(Columns):
 
     @property
     def power(self) -> Floats:
-        """Received power, float64 (N,), m⁻²: that of reflectivity 1 at 1 m is 1."""
+        """Received power, float64 (N,), m⁻²: 1 for a reflectivity of 1 at 1 m."""
         return self.reflectivity / self.range**2

@@ -50,9 +50,9 @@ class Drive:
     Attributes:
         speed: Speed of the sensor along the street, m/s; 0 stands.
         traffic: Number of cars and pedestrians that move, each at a speed of its own.
-        skew: True if every beam sees the scene as it is when that beam is sent, so that a scan is
-            skewed by what moves while it is taken; else all of a scan is seen as it is when the
-            scan begins, as after a perfect correction.
+        skew: True if every beam sees the scene at the time of that beam, so that moving objects
+            and the sensor's motion skew a scan; False if all beams see the scene at the start of
+            the scan, as after a perfect correction.
 
     Raises:
         InputError: A speed or a number that is impossible, or skew where nothing moves.
@@ -157,8 +157,8 @@ class SplitSequences(ABC):
 
 def _check_count(name: str, count: int, least: int) -> None:
     if not least <= count <= MOST:
-        few_or_many = "few" if count < least else "many"
-        raise InputError(name, f"{shown(count)} is too {few_or_many}", f"Give {least} to {MOST:,}.")
+        amount = "few" if count < least else "many"
+        raise InputError(name, f"{shown(count)} is too {amount}", f"Give {least} to {MOST:,}.")
 
 
 @dataclass(frozen=True)

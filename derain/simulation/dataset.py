@@ -4,10 +4,10 @@ manifest.json       campaign, split, rain rate of each sequence, SHA-256 of each
 sequences/000/...   see :mod:`derain.simulation.sequence`
 .derain/            records of the sequences that are simulated, see :mod:`derain.jobs.job`
 
-A sequence is a unit of a job, and its folder appears when it is complete, so that an interrupted
-run can be taken up again. Each sequence is drawn with a random generator of its own, so that
-neither an interruption nor processes, shards and machines change a byte. Of two runs on one folder
-the second waits for the first; shards of one run do not wait for each other.
+A sequence is a unit of a job, and its folder appears when it is complete, so an interrupted run can
+resume. Each sequence has a random generator of its own, so interruptions, processes, shards and
+machines do not change a byte. If two runs use one folder, the second waits for the first; shards of
+one run do not wait for each other.
 """
 
 import os
@@ -46,7 +46,7 @@ def simulate_track(
     *,
     keep: bool = True,
 ) -> bool:
-    """Simulates a data set, or what is missing of it.
+    """Simulates a data set, or its missing parts.
 
     Args:
         root: Folder to write: a new or an empty one, or one that holds part of this very data set.

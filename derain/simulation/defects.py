@@ -1,7 +1,7 @@
 """Defects of a scan besides noise: lost and copied returns, range steps, mixed points.
 
-Every return keeps its label, so that none becomes rain or ceases to be; a point between two
-surfaces gets the label of the nearer one.
+Every return keeps its label: no return becomes rain, and no rain becomes something else. A point
+between two surfaces gets the label of the nearer one.
 """
 
 from dataclasses import dataclass, replace
@@ -14,7 +14,7 @@ from derain.simulation.classes import TrackClass, unpacked
 from derain.simulation.settings import Settings, Share
 
 # Parts of a scan that are lost together: sensors send a scan in 75 (Ouster) to 180 (Velodyne)
-# packets, of which a network drops some in a row.
+# packets, and a network drops some of them in a row.
 SECTORS_OF_A_SCAN = 60
 
 # Two neighbouring returns nearer together than this are of one surface, metres.
@@ -38,7 +38,7 @@ class Defects(Settings):
         merging: Distance of two surfaces within which a sensor takes them for one, metres.
         range_step: Distances are multiples of it, metres; 0 for any distance.
         copies: Share of the beams with a single return that report it twice: two rows of the scan
-            are the same. A dual sensor whose two returns are one does so with all.
+            are the same. A dual sensor with equal returns copies all of them.
 
     Raises:
         InputError: A value that is impossible.
@@ -77,7 +77,7 @@ class Defects(Settings):
         merged = _merged(returns, row[~apart], beside[~apart], share[~apart])
         if not dual:
             return merged
-        return _with_both(merged, row[apart], returns.take(beside[apart]), share[apart])
+        return _with_second_returns(merged, row[apart], returns.take(beside[apart]), share[apart])
 
     def received(self, returns: Returns, shape: tuple[int, int], generator: Generator) -> Bools:
         """True for returns that are not lost, bool (N,).
@@ -145,8 +145,8 @@ def _merged(returns: Returns, row: Ints, beside: Ints, share: Floats) -> Returns
     return Returns(*columns, returns.beam)
 
 
-def _with_both(returns: Returns, row: Ints, second: Returns, share: Floats) -> Returns:
-    """Gives the beams of some rows a second return, with a share of what it would be by itself."""
+def _with_second_returns(returns: Returns, row: Ints, second: Returns, share: Floats) -> Returns:
+    """Adds a second return to the beams of some rows; the two returns share the beam's power."""
     first = returns.reflectivity.copy()
     first[row] *= 1 - share
     both = [

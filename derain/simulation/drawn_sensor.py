@@ -84,8 +84,8 @@ class SensorSpans(Spans):
         rosette_width: Diameter of a rosette.
         rosette_beams: Shots of a rosette. Log-uniform.
         prism_turns: Turns of the faster prism in a scan. Log-uniform.
-        most_beams: Where a sensor would have more, its columns are farther apart.
-        returns: Weight of what is reported of a beam that several things return.
+        most_beams: Largest number of beams. To keep it, columns are farther apart.
+        returns: Weight of each way to report a beam with several returns.
         range_noise: Log-uniform.
         range_noise_growth: Metres per metre.
         weak_range_noise: Metres.
@@ -167,8 +167,8 @@ NUMBERS = [one.name for one in fields(Sensor) if one.type in (float, Positive)]
 # Defects that only some sensors have.
 DEFECTS = ("dropped", "dropped_rows", "dropped_sectors", "mixed", "range_step", "copies")
 
-# The slower prism of a rosette turns the other way, at so many times the speed of the faster one:
-# .64 in the Livox Mid-40.
+# The slower prism of a rosette turns the other way. This is its speed as a factor of the faster
+# one's: .64 in the Livox Mid-40.
 PRISM_RATIO = (0.4, 0.8)
 
 # Lasers of a rosette.
@@ -202,7 +202,7 @@ def draw_sensor(spans: SensorSpans, generator: Generator) -> Sensor:
 
 
 def draw_defects(spans: DefectSpans, generator: Generator, *, dual: bool) -> Defects:
-    """Draws what is wrong with the scans of a sensor.
+    """Draws the defects of a sensor's scans.
 
     Args:
         spans: The ranges to draw from.
@@ -276,7 +276,7 @@ def _laser_offsets(lasers: int, generator: Generator) -> tuple[float, ...]:
 
 
 def _columns(width: float, step: float, rows: int, spans: SensorSpans) -> int:
-    """Columns of a field so wide, in degrees, so many degrees apart."""
+    """Number of columns in a field of a width, at a step between columns, both degrees."""
     return max(math.ceil(min(width / step, spans.most_beams // rows)), 1)
 
 
@@ -302,7 +302,7 @@ def draw_row_table(
         field: Lowest and highest row, degrees.
         rows: Number of rows, two or more.
         generator: Random generator.
-        even: True if all steps are alike, but for some misalignment.
+        even: True if all steps are alike, except for some misalignment.
 
     Returns:
         Inclinations from top to bottom, degrees, all within the field.
@@ -336,7 +336,7 @@ def draw_row_azimuths(rows: int, most: float, generator: Generator) -> tuple[flo
         generator: Random generator.
 
     Returns:
-        Turns from top to bottom; empty where there are none.
+        Turns from top to bottom; empty if there are none.
     """
     match generator.choice(["one line", "few columns", "each by itself"]):
         case "one line":

@@ -1,11 +1,11 @@
 """Lays out test tracks at random: the street, and the rain facility, like REHEARSE's test track.
 
-What the surfaces of the facility return is what matt materials return in the near infrared. How
-rough they are and how far they differ was chosen so that intensities, of 0..255, are distributed as
-far as that is known of REHEARSE-3D: there their mean is about 23 and their standard deviation about
-17, drops lie below about 10, and hardly anything else lies below 13. All of that is deduced from
-the network that is published for it, whose first BatchNorm layer holds the moments of what it was
-trained on, and which decides by intensity; it then finds the simulated rain.
+The surfaces of the facility reflect like matt materials in the near infrared. Their roughness and
+their differences were chosen to match the known distribution of intensities, 0..255, in
+REHEARSE-3D: the mean is about 23 and the standard deviation about 17, drops lie below about 10, and
+hardly anything else lies below 13. These figures are deduced from the network published for
+REHEARSE-3D: its first BatchNorm layer holds the moments of its training data, and it decides by
+intensity. With them, this network finds the simulated rain.
 `benchmarks/facility_observer.py` and `benchmarks/batchnorm_memory.py` show it.
 """
 
@@ -116,9 +116,9 @@ def _buildings(half_width: float, generator: Generator) -> Iterator[Surface]:
     yield objects.building(generator).placed(generator.uniform(70, 110), generator.uniform(-20, 20))
 
 
-# What stands on the road, and between which distances from the sensor, metres. In REHEARSE they
-# stand at 10 to 112 m. Within that, the distances are chosen so that every class has about the
-# share of the points that it has in REHEARSE-3D.
+# Road users, and the limits of their distances from the sensor, metres. In REHEARSE they stand at
+# 10 to 112 m. The distances within these limits give every class about its share of the points in
+# REHEARSE-3D.
 # Source: REHEARSE-3D, section III.A.
 ROAD_USERS: tuple[tuple[Callable[[Generator], Surface], tuple[float, float]], ...] = (
     (objects.car, (30, 80)),
@@ -145,8 +145,8 @@ ASPHALT_REFLECTIVITY = (0.12, 0.20)
 GROUND = (0.13, 0.27)
 LEAVES = (0.03, 0.6)
 
-# Of the asphalt and of the ground, radians: a modelling choice. At a grazing angle they return 0.36
-# of their reflectivity, so that a road of 0.17 measures 16 of 255 wherever the sensor looks.
+# Roughness of the asphalt and of the ground, radians: a modelling choice. At a grazing angle they
+# return 0.36 of their reflectivity, so a road of 0.17 measures 16 of 255 in every direction.
 ROUGHNESS = 0.6
 
 

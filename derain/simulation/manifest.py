@@ -1,7 +1,7 @@
 """The manifest of a simulated data set: its description, and the checksum of every file.
 
-It is written twice: without ``files`` when the work begins, so that a run that is taken up again
-recognises the folder, and with ``files`` when every sequence is there.
+It is written twice: without ``files`` at the start, so that a resumed run recognises the folder,
+and with ``files`` when every sequence is complete.
 """
 
 import hashlib
@@ -32,7 +32,7 @@ LARGEST_MANIFEST = 2**26
 
 
 def read_manifest(root: Path) -> dict[str, Any]:
-    """The manifest of a simulated data set, finished or not; empty where there is none.
+    """The manifest of a simulated data set, finished or not; empty if there is none.
 
     Returns:
         As far as the file has them: ``split``, lists of sequences by part; ``rain_rate_mm_h``, by

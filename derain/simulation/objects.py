@@ -47,7 +47,7 @@ class Surface:
 # Something made at the origin, of one surface or of several.
 Make = Callable[[Generator], Surface | Iterable[Surface]]
 
-# Makers and the shares that they have in what is chosen.
+# Makers of objects, and their shares in a random choice.
 Options = Iterable[tuple[Make, float]]
 
 # Made piece by piece along a line, by the length of a piece in metres.
@@ -223,13 +223,13 @@ def specks(surface: Triangles, sensor: Floats, count: int, generator: Generator)
 
     Args:
         surface: Triangles that they lie on, (T, 3, 3), metres.
-        sensor: Place of the sensor, (3,), metres. The farther a speck is, the larger it is, so that
-            a beam, which widens as well, is returned by it.
+        sensor: Place of the sensor, (3,), metres. Specks grow with distance, as beams widen, so
+            that they still return them.
         count: Their number.
         generator: Random generator.
 
     Returns:
-        At most so many; fewer where they would be too near to the sensor.
+        At most ``count``; those that would be too near to the sensor are left out.
     """
     places = on_surface(surface, count, generator)
     # A clump is what lies nearest to one of a few places: the rest of the surface stays empty.
@@ -247,7 +247,7 @@ def specks(surface: Triangles, sensor: Floats, count: int, generator: Generator)
 def mirrored(
     surface: Surface, sensor: Floats, count: int, generator: Generator
 ) -> Iterator[Surface]:
-    """A surface that mirrors the light away and hides what is behind it, with specks on it.
+    """A surface with specks that mirrors the light away and hides the things behind it.
 
     Args:
         surface: The surface as it would be if it returned all over.

@@ -1,7 +1,7 @@
 """A 4D radar, and its detections of a track in the rain.
 
 The radar sorts its echoes into cells of inclination, azimuth and range. The mean echo of a cell is
-that of the surfaces and the rain in it, and of noise. Every frame draws the echo of each cell anew,
+the sum of its surfaces, its rain and noise. Every frame draws the echo of each cell anew,
 at random about that mean, and a cell whose echo exceeds those of its neighbours in range is a
 detection. Echoes are radar cross-sections in m². The rain's attenuation is left out: through a
 facility's rain and back it is 2 dB, less than an echo varies from frame to frame.
@@ -71,7 +71,7 @@ class Radar:
         accuracy: Standard deviation of a measured position, as a share of the cell.
         doppler_noise: Standard deviation of a measured speed, m/s.
         mounting_height: Height above the road, metres.
-        frame_rate: Frames per second, Hz; that of REHEARSE-3D's 496 frames in 30 s.
+        frame_rate: Frames per second, Hz; as in REHEARSE-3D: 496 frames in 30 s.
     """
 
     azimuth: tuple[float, float] = (-50.0, 50.0)
@@ -159,7 +159,7 @@ def detect(mean: Floats, radar: Radar, generator: Generator) -> Scan:
     Returns:
         The detections, in the radar's frame: ``fields`` has x, y, z (metres), doppler (m/s, along
         the line of sight, positive recedes) and rcs (dBsm), all float32. Labels are the TrackClass
-        of what returned most; that of noise is background.
+        of the strongest return; noise is background.
     """
     inclination, azimuth, distance = radar.centres()
     echo = mean.sum(axis=0) * generator.exponential(size=radar.shape)
@@ -215,8 +215,8 @@ def surface_echoes(track: Track, radar: Radar) -> tuple[Floats, Floats]:
 def rain_echoes(rain: RainField, farthest: Floats, radar: Radar) -> Floats:
     """Mean echo of the rain in every cell.
 
-    The radar looks almost level. So the rain in a cell is taken to be that over the ground at the
-    cell's azimuth and range, whatever its inclination.
+    The radar looks almost level. The rain in a cell is therefore approximated by the rain over the
+    ground at the cell's azimuth and range, independently of its inclination.
 
     Args:
         rain: The rain.

@@ -105,8 +105,7 @@ def farthest_visible_drop(sensor: Sensor) -> float:
     return (math.sqrt(aperture**2 + 4 * spread * product) - aperture) / (2 * spread)
 
 
-# The field is sampled in so many sectors around the sensor, and along each of them every so many
-# metres.
+# Sampling of the field: the number of sectors around the sensor, and the step along each, metres.
 SECTORS = 360
 SAMPLE_SPACING = 1.0
 

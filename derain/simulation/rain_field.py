@@ -87,7 +87,7 @@ class UniformRain:
 
     def __post_init__(self) -> None:
         if not 0 <= self.nominal <= HARDEST_RAIN:
-            raise _no_rate(self.nominal)
+            raise _unknown_rate_error(self.nominal)
 
     @property
     def heaviest(self) -> float:
@@ -122,7 +122,7 @@ class SprinkledRain:
 
     def __post_init__(self) -> None:
         if not 0 < self.nominal <= HARDEST_RAIN:
-            raise _no_rate(self.nominal)
+            raise _unknown_rate_error(self.nominal)
         if not all(map(math.isfinite, self.wind)):
             raise InputError("wind", f"{self.wind} m/s is no wind", "Give two finite numbers.")
 
@@ -164,7 +164,7 @@ class SprinkledRain:
         return np.concatenate(rows) + TIME_IN_WIND * np.asarray(self.wind)
 
 
-def _no_rate(rate: float) -> InputError:
+def _unknown_rate_error(rate: float) -> InputError:
     return InputError(
         "rain rate", f"{rate} mm/h is no rain rate", f"Give up to {HARDEST_RAIN:g} mm/h."
     )

@@ -25,12 +25,11 @@ USUAL_REFLECTIVITY = 0.1
 def rain_on_scan(scan: Scan, rain: RainField, sensor: Sensor, generator: Generator) -> Scan:
     """Simulates rain on a scan that was recorded in clear air.
 
-    A return stays where it is and gets darker, or a drop in front of it takes its place, or it is
-    lost. A beam that returned nothing may hit a drop; see :func:`find_beams` for how such beams are
-    found. Returns nearer than the sensor's minimum range are the vehicle's own and stay as they
-    are, and so do points of a radar. Two returns of one beam that stand in two rows are treated as
-    returns of two beams, so that such a beam meets twice as many drops. Columns of a second return
-    in the same row stay as they are.
+    A return keeps its place and gets darker, or a drop in front of it takes its place, or it is
+    lost. A beam that returned nothing may hit a drop; :func:`find_beams` finds such beams. Returns
+    nearer than the sensor's minimum range are the vehicle's own and do not change, nor do points of
+    a radar. Two returns of one beam in two rows are treated as returns of two beams, so such a beam
+    meets twice as many drops. Columns of a second return in the same row do not change.
 
     Reflectivity is the intensity as a share of its full scale (1, 255 or 65,535), or a tenth where
     the scan has none. Where all intensities are equal they were not measured: every return keeps
@@ -91,7 +90,7 @@ def _clear_air(
     else:
         reflectivity = np.clip(scan.intensity[row] / full_scale([scan]), 0, 1).astype(np.float64)
     needed = sensor.detection_threshold * range_**2
-    # What is drawn is at least 0 and less than 1, so that nothing is divided by 0.
+    # The random numbers are at least 0 and less than 1, so there is no division by 0.
     excess = 1 / (1 - generator.random(len(row)))
     reflectivity = np.where(reflectivity < needed, needed * excess, reflectivity)
     return Returns(
@@ -154,8 +153,8 @@ RANGE_NAMES = ("range", "distance")
 def with_points(scan: Scan, rows: Ints, xyz: Floats) -> Scan:
     """The scan with other coordinates in some rows.
 
-    Columns of coordinates, and of range or distance in whatever unit, get the new values in their
-    own dtype; every other row stays as it is, to the bit.
+    Columns of coordinates, and of range or distance in any unit, get the new values in their own
+    dtype; every other row stays the same, to the bit.
 
     Args:
         scan: The scan.
@@ -175,7 +174,7 @@ def with_points(scan: Scan, rows: Ints, xyz: Floats) -> Scan:
 
 
 def with_intensity(scan: Scan, rows: Ints, intensity: Floats) -> Scan:
-    """The scan with other intensities in some rows; every other row stays as it is, to the bit.
+    """The scan with other intensities in some rows; every other row stays the same, to the bit.
 
     Args:
         scan: A scan with intensities.

@@ -28,8 +28,8 @@ class RecordedBeams:
     """The beams of a recorded scan: first one for each of its N rows, then those without a row.
 
     Attributes:
-        row: Row of the scan that stands for each beam, int64 (B,): its own; of beams without one,
-            that of the return before them in the same row of the sensor's grid.
+        row: Row of the scan that stands for each beam, int64 (B,): the beam's own row; for a beam
+            without a return, the row of the return before it in the same row of the sensor's grid.
         direction: Unit vectors, float64 (B, 3), sensor frame; not a number where it is not known.
         returned: True for the beams that returned, bool (B,).
     """
@@ -47,13 +47,13 @@ def find_beams(scan: Scan, generator: Generator) -> RecordedBeams:
 
     - An organised scan has a cell for each beam. The direction of an empty cell is the sum of the
       usual angles of its row and of its column. It is not known in a row or column without any
-      return, nor in a scan whose returns are far from the directions so found, such as that of a
-      sensor that scans in a rosette.
+      return, nor in a scan with returns far from the directions found in this way, such as a scan
+      in a rosette.
     - To any other scan a grid is fitted, see :func:`derain.views.grid_fit.fit_grid`. Its empty
       pixels are beams that returned nothing, with an exception: a return that shares its pixel with
-      another has left a pixel of its own empty. So as many empty pixels, chosen at random, are no
-      beams. A sensor that looks one way, and whose returns are in no rows, may have a round field
-      of view: of its pixels only those in the convex hull of the returns are beams.
+      another has left a pixel of its own empty. The same number of empty pixels, chosen at random,
+      are therefore no beams. A sensor that looks one way, with returns in no rows, may have a round
+      field of view: only its pixels in the convex hull of the returns are beams.
 
     Args:
         scan: The scan. Rows that are not valid, or of a radar, are empty cells or no beams.

@@ -21,7 +21,7 @@ from derain.views.spherical_grid import FULL_CIRCLE
 
 FULL_SCALE_INTENSITY = 255.0
 
-# Sensors of today have a tenth of it; the rays of so many take 200 MB.
+# Sensors of today have a tenth of it; the rays of this number of beams take 200 MB.
 MOST_BEAMS = 2**22
 
 # Prisms of today turn some hundred times a second.
@@ -60,8 +60,8 @@ class Sensor(Settings):
         rows: Beams per column.
         row_inclinations: Inclination of every row from top to bottom, degrees, where they are not
             evenly spaced; else empty.
-        row_azimuths: How far every row points to the left of its columns, degrees, where they are
-            not one above the other; else empty.
+        row_azimuths: Angle of every row to the left of its columns, degrees; empty if the rows are
+            one above the other.
         pattern: ``grid``, or ``rosette``: two prisms deflect the beams over the ellipse that fits
             into the field of view. Then a row is what one laser sees, in the order of time;
             ``row_inclinations`` is by how much it points above the others, and without them all
@@ -83,8 +83,8 @@ class Sensor(Settings):
         encoder_noise: Standard deviation of the azimuth that is measured of a column, degrees.
         intensity_noise: Standard deviation of a measured intensity, relative to it.
         mounting_height: Height above the road, metres.
-        returns: What is reported of a beam that several things return: ``strongest``, ``last``
-            (the farthest of those detected), or ``dual`` (both, where they differ).
+        returns: Reported returns of a beam with several: ``strongest``, ``last`` (the farthest of
+            those detected), or ``dual`` (both, if they differ).
         frame_rate: Scans per second, Hz.
         defects: Defects of its scans.
 

@@ -81,7 +81,7 @@ class Settings:
         return cls().changed(entry)
 
     def changed(self, entry: Entry) -> Self:
-        """The same settings but for those that a document states; errors as for :meth:`of`."""
+        """The settings with the changes stated in a document; errors as for :meth:`of`."""
         parsers = {
             one.name: self.READ_BY.get(one.name) or _parser(one.type) for one in fields(self)
         }

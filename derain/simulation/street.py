@@ -1,7 +1,7 @@
 """Lays out a street to drive along: as long as the drive and the sensor's sight need it.
 
-The x axis runs along the sensor's lane, the origin lies under the first scan. To the left of the
-lane is that of oncoming vehicles; on both sides follow parked cars, a pavement, a verge and houses.
+The x axis runs along the sensor's lane, the origin lies under the first scan. The lane of oncoming
+vehicles is on its left. On both sides follow parked cars, a pavement, a verge and houses.
 """
 
 from collections.abc import Iterator
@@ -43,8 +43,8 @@ class Street:
     Attributes:
         length: Distance that the sensor drives, metres.
         lane: Width of each of the two lanes, metres.
-        junctions: Where the axes of side streets are, metres along x, ascending. They are as wide
-            as the street's two lanes and carry traffic across it.
+        junctions: Positions of the axes of side streets, metres along x, ascending. Side streets
+            are as wide as the street's two lanes, and their traffic crosses it.
     """
 
     length: float
@@ -73,7 +73,7 @@ class Street:
         return self.lane / 2
 
     def beside(self, side: int, outwards: float) -> float:
-        """The y of a place so many metres outwards from the lanes, on the left (1) or right."""
+        """The y of a place at a distance from the lanes, metres, on the left (1) or right."""
         return self.axis + side * (self.lane + outwards)
 
     def in_junction(self, triangles: Triangles) -> bool:

@@ -134,7 +134,7 @@ def draw_traffic(
         generator: Random generator.
 
     Raises:
-        InputError: There is no room for so many.
+        InputError: There is no room for this number.
     """
     taken = [VEHICLE + np.stack([speed * times, 0 * times], axis=1)[:, None, :]]
     things = []

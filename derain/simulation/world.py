@@ -38,7 +38,7 @@ STEM = "000000"
 DRAWN_WORLDS = "drawn.yaml"
 
 # A scan with fewer points teaches nothing, and one with a greater share of rain shows weather that
-# no sensor is used in: both are drawn again, at most so many times before the world is refused.
+# no sensor is used in. Both are drawn again, up to a limit; then the world is refused.
 SMALLEST_SCAN = 1000
 LARGEST_SHARE_OF_RAIN = 0.4
 MOST_TRIES = 100
@@ -93,12 +93,11 @@ def draw_scan(world: World, generator: Generator) -> tuple[Scan, dict[str, Any]]
         generator: Random generator.
 
     Returns:
-        The scan, intensities in 0..255, labels TrackClass; and what was drawn, in primitives:
+        The scan, intensities in 0..255, labels TrackClass; and the values drawn, as primitives:
         ``place``, the name of the layout, and the attributes of ``sensor`` and ``precipitation``.
 
     Raises:
-        InputError: A world of which hardly a scan holds anything but rain, or Open3D cannot be
-            imported.
+        InputError: Nearly every scan of the world holds only rain, or Open3D cannot be imported.
     """
     for _ in range(MOST_TRIES):
         sensor = draw_sensor(world.sensors, generator)

@@ -40,7 +40,7 @@ class BagFrame(FileFrame):
 
     @property
     def folder(self) -> Path:
-        """The folder of results that a copy of its bag goes to, relative to that of all results."""
+        """The folder of the copy of its bag, relative to the folder of all results."""
         return Path(self.key).parent.parent
 
     @property
@@ -99,11 +99,11 @@ def bag_frames(path: Path, labelled: bool = False, prefix: str = "") -> list[Bag
         path: A bag; a topic in it, ``bag/topic``; or one of its clouds, ``bag/topic/000012`` or
             ``bag/000012``.
         labelled: True if frames have their labels: ``<stem of the bag>.labels/000012.label``.
-        prefix: First part of all keys; empty where the bag is the only one.
+        prefix: First part of all keys; empty if the bag is the only one.
 
     Raises:
         InputError: A path that leads into no bag; a bag that cannot be read; no such topic or
-            cloud; several topics of clouds, of which none is named.
+            cloud; several topics of clouds, and none is named.
     """
     clouds, number = _clouds_at(path)
     numbers = range(len(clouds)) if number is None else [number]
@@ -151,7 +151,7 @@ def clouds_at(path: Path) -> CloudTopic:
 
 
 def _clouds_at(path: Path) -> tuple[CloudTopic, int | None]:
-    """The clouds that a path leads to, and which of them it names."""
+    """The clouds at a path, and the number of the one that it names."""
     found = split(path)
     if found is None:
         raise InputError(path, "there is no such file or folder", "Check the path.")

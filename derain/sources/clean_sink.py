@@ -26,8 +26,8 @@ from derain.stores.url import Place, is_url, is_web, path_of, url_of, without_se
 class CleanSink:
     """Writes the scans of a source without their rain, and their labels (1 = rain).
 
-    Bags of which all clouds are in the source are written anew. It is a context manager: a bag is
-    in its place when its last cloud is written, the last bag at the end of the block.
+    A bag is written anew if all its clouds are in the source. The sink is a context manager: a bag
+    is in its place once its last cloud is written, and the last bag at the end of the block.
 
     Example:
         >>> source = derain.named_frames("scan.bin")
@@ -49,7 +49,7 @@ class CleanSink:
 
     Attributes:
         folder: Folder to write to, or the path that stands for its URL.
-        destination: By which any process opens a sink alike for other scans.
+        destination: Opens an equal sink for other scans in any process.
         options: Options, true, false or a name each.
     """
 
@@ -197,7 +197,7 @@ class Destination:
             source: The scans.
 
         Yields:
-            The sink; and the sizes and versions of what is uploaded, by path, after the block.
+            The sink; and the sizes and versions of the uploaded files, by path, after the block.
 
         Raises:
             InputError: A folder or a store that cannot be written, or what CleanSink refuses.
@@ -211,7 +211,7 @@ class Destination:
             yield stack.enter_context(self._sink(folder, removed, source)), stamps
 
     def stamps(self) -> dict[str, str]:
-        """Sizes and versions of what is there in stores, by path.
+        """Sizes and versions of the results in stores, by path.
 
         Raises:
             InputError: A store that cannot be reached.
@@ -223,7 +223,7 @@ class Destination:
         return found
 
     def holds(self, source: Source) -> bool:
-        """True if all files are there that are written of scans, but for those in stores.
+        """True if all result files of the scans exist; files in stores are not checked.
 
         Args:
             source: The scans.

@@ -48,11 +48,11 @@ class BagOptions:
 class CleanedBags:
     """Writes copies of whole bags, each with the clean clouds that it is given.
 
-    A cloud that is not given stays as it is. A bag that cannot be written to its end is removed.
+    A cloud without a result does not change. A bag that cannot be written to its end is removed.
 
     Args:
         out: The folder to write to.
-        source: All frames of the run. Bags of which it has only some clouds are not copied.
+        source: All frames of the run. A bag is copied only if all its clouds are among them.
         options: Options for each cloud.
         probability: True if points get a field of their probability to be rain.
 
@@ -203,7 +203,7 @@ class CleanedBags:
 
 
 def _whole_topics(source: Iterable[Frame]) -> dict[CloudTopic, Path]:
-    """The topics all of whose clouds are in a source, with the folders of their copies."""
+    """The topics with all their clouds in a source, and the folders of their copies."""
     frames = [frame for frame in source if isinstance(frame, BagFrame)]
     folders = {frame.clouds: frame.folder for frame in frames}
     numbers = Counter(frame.clouds for frame in frames)

@@ -73,8 +73,8 @@ class ScanOutcome:
         issues: Warnings about it.
         cleaned: Its results; None if it could not be cleaned.
         seconds: Its time, seconds; None if unknown.
-        packed: The weather that it shows, as text; None where it was not measured.
-        error: Why it could not be cleaned; None where it was.
+        packed: The weather in the scan, as text; None if it was not measured.
+        error: The error of a scan that could not be cleaned; None if it was cleaned.
         recording: The unbroken recording that it is of, where only its unit shows that.
         uploaded: Sizes and versions of what its unit uploaded, by path, with the last scan of it.
     """
@@ -96,7 +96,7 @@ class ScanOutcome:
 
     @property
     def measured(self) -> ScanWeather | None:
-        """The weather that it shows; None where it was not measured."""
+        """The weather in the scan; None if it was not measured."""
         return None if self.packed is None else unpacked(self.packed)
 
     def with_weather(self, weather: WeatherRecord | None) -> Self:
@@ -106,7 +106,7 @@ class ScanOutcome:
     def to_json(self) -> dict[str, Any]:
         """The outcome of a cleaned scan as the record of its unit has it."""
         cleaned = asdict(self.figures)
-        del cleaned["weather"]  # that of a recording depends on the scans before
+        del cleaned["weather"]  # a recording's weather depends on the scans before
         return {
             "cleaned": cleaned,
             "key": self.frame.key,
@@ -180,12 +180,12 @@ def unpacked(text: str) -> ScanWeather:
 
 def _hour(seconds: float | None, recording: str) -> str:
     """The hour of a time, by its date, or within its recording."""
-    of_recording = "" if recording == "." else f"{recording}, "
+    prefix = "" if recording == "." else f"{recording}, "
     if seconds is None or not math.isfinite(seconds):
-        return f"{of_recording}without times"
+        return f"{prefix}without times"
     if seconds < UNIX_TIMES_FROM:
-        return f"{of_recording}hour {int(seconds // 3600)}"
+        return f"{prefix}hour {int(seconds // 3600)}"
     try:
         return datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%d %H:00 UTC")
     except (OverflowError, ValueError, OSError):  # for instance nanoseconds
-        return f"{of_recording}without times in seconds"
+        return f"{prefix}without times in seconds"

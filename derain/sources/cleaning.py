@@ -1,4 +1,4 @@
-"""Cleans the scans of a source, and reports what was done."""
+"""Cleans the scans of a source, and reports the results."""
 
 from collections import Counter
 from contextlib import nullcontext
@@ -110,14 +110,14 @@ def clean(
         weather: Options for measuring the weather.
         observer: Follows the cleaning.
         division: Division of the scans into units. Where there are more scans than a block has,
-            a record of each unit is kept in the folder, from which a run that was stopped resumes.
+            the folder keeps a record of each unit, and a run resumes from them after a stop.
             None keeps no records, unless there is an executor, or a source or a sink in an object
             store.
         executor: Does the units: an executor of :mod:`concurrent.futures` or the like, whose
             processes find all files by the same paths. None does them in this process.
 
     Returns:
-        What was done to each scan, and to all of them.
+        The results of each scan, and of all together.
 
     Raises:
         InputError: No scans, a folder whose files would be overwritten, or a bag that cannot be

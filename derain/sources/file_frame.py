@@ -28,7 +28,7 @@ class FileFrame(Frame):
     Attributes:
         path: The file.
         columns: Names of its columns, where it does not name them itself.
-        records: Times and poses of the scans in its folder; None where none are to be read.
+        records: Times and poses of the scans in its folder; None if none are to be read.
     """
 
     path: Path
@@ -97,8 +97,8 @@ class FileFrame(Frame):
 
     def stamp(self) -> str:
         """Size and time of change of its file, its labels, and the records beside it."""
-        of_records = "" if self.records is None else self.records.stamp
-        return f"{stamp_of(self.path)} {of_records}{self._label_stamp()}"
+        records_stamp = "" if self.records is None else self.records.stamp
+        return f"{stamp_of(self.path)} {records_stamp}{self._label_stamp()}"
 
     def _label_stamp(self) -> str:
         labels = self.label_path

@@ -1,4 +1,4 @@
-"""Scans as a user names them, in files and folders, or as a program gives them."""
+"""Frames of the files and folders that a user names, and of the scans that a program passes."""
 
 import os
 from collections import Counter
@@ -28,22 +28,22 @@ from derain.sources.source import Frames, Source
 from derain.stores.url import is_url
 from derain.system.notices import warn_once
 
-# Scans may be written as text, but beside folders of scans a text is a note or a record.
+# Scans may be text files, but a text file in a folder of recordings is usually a note or a record.
 TEXTS = (".csv", ".txt")
 
 # File that only a simulated data set has.
 MANIFEST_OF_SIMULATION = "manifest.json"
 
-# Gives the clouds of a bag, or at a path into one, with or without labels, whose keys begin with a
-# prefix unless it is empty.
+# Returns the clouds of a bag, or those at a path into one. Arguments: the path; whether to read
+# labels; the prefix of the keys, which may be empty.
 FramesOfBag = Callable[[Path, bool, str], Sequence[Frame]]
 
-# What a program gives: one of them, or several of one kind or another.
+# Argument of public functions: one item, or several items of any of these kinds.
 GivenScans = Source | Scan | Frame | str | Path | Iterable[Scan | Frame | str | Path]
 
 
 def _clouds_of_bag(bag: Path, labelled: bool, prefix: str) -> Sequence[Frame]:
-    # What reads bags is imported only where there are some.
+    # The reader of bags is imported only when there is a bag.
     from derain.sources.bag_frame import bag_frames
 
     return bag_frames(bag, labelled, prefix)
@@ -66,25 +66,24 @@ def named_frames(
         [('scan', 820, True)]
 
     Args:
-        paths: One path or several: scans, folders with scans directly in them, data sets or parts
-            of them whose folders are named as in a layout, bags, and paths into bags
-            (:func:`~derain.sources.bag_frame.bag_frames`); folders of recordings, in which all of
-            these are found at any depth; or ``example``, which comes with derain.
+        paths: One path or several: scans; folders with scans directly in them; data sets or parts
+            of them with the folder names of a layout; bags and paths into bags
+            (:func:`~derain.sources.bag_frame.bag_frames`); folders with any of these at any depth
+            (folders of recordings); or ``example``, which comes with derain.
         columns: Names of the columns of files that do not name them.
-        labelled: True to read labels, from the place that :func:`~derain.cards.known.label_of`
-            finds by the layouts.
-        layouts: What the folders of data sets may be called, the likeliest first; by default as in
-            the packaged data cards. An empty sequence takes neither data sets nor folders of
-            recordings.
-        recordings: True if each folder is a recording, which numbers its scans as others do.
-        topic: Topic of the bags among them; None where each has only one of clouds.
-        results: Folders of results, which are passed over in a folder of recordings.
+        labelled: True to read labels. :func:`~derain.cards.known.label_of` finds them by the
+            layouts.
+        layouts: Layouts of data sets, the likeliest first; by default those of the packaged data
+            cards. An empty sequence excludes data sets and folders of recordings.
+        recordings: True if each folder is a recording, with numbers that may occur in others, too.
+        topic: Topic of the bags among them; None if each has only one topic of clouds.
+        results: Folders of results, which are skipped in a folder of recordings.
 
     Returns:
-        The scans in the order they are named, those of a folder sorted by name. Each has its stem
-        for a key; where a data set is named, or several recordings, its path from the folder that
-        all scans lie below. In a folder of recordings the key begins with the path of the recording
-        from there, which stays when others are added.
+        The scans in the order of the paths; those of a folder are sorted by name. A scan's key is
+        its stem. If a data set or several recordings are named, the key is the scan's path relative
+        to the common parent folder of all scans. In a folder of recordings, the key begins with the
+        recording's path relative to that folder, which does not change if others are added.
 
     Raises:
         InputError: A path that does not exist, a folder without scans, a bag that cannot be read,
@@ -102,11 +101,11 @@ class FrameFinder:
     Attributes:
         columns: Names of the columns of files that do not name them.
         labelled: True to read labels.
-        layouts: Names of the folders of data sets.
+        layouts: Layouts of data sets.
         recordings: True if each folder is a recording.
         topic: Topic of the bags.
         results: Folders of results, which are no recordings.
-        frames_of_bag: Gives the clouds of each bag.
+        frames_of_bag: Returns the clouds of a bag.
     """
 
     columns: Sequence[str] = DEFAULT_COLUMNS
@@ -133,7 +132,7 @@ class FrameFinder:
         return Frames(frames)
 
     def _below(self, folder: Path, found: Sequence[Path]) -> Iterator[Frame]:
-        """The scans of the recordings in a folder, with the paths of these in their keys."""
+        """The scans of the recordings in a folder; their keys begin with the recording's path."""
         for path in found:
             place = path.relative_to(folder)
             if is_bag(path):
@@ -146,30 +145,30 @@ class FrameFinder:
                     yield replace(frame, sequence=name, key=f"{name}/{frame.key}")
 
     def _named(self, paths: Sequence[Path], several: bool = False) -> list[Frame]:
-        """The scans at paths, none of which is a folder of recordings.
+        """The scans at paths that are not folders of recordings.
 
         Args:
             paths: The paths.
             several: True if there are other paths besides.
         """
         found = [_scans_or_bags(path, self.layouts) for path in paths]
-        scans = [scan for of_path, _ in found for scan in of_path]
+        scans = [scan for scans_at_path, _ in found for scan in scans_at_path]
         # A data set's scans lie in several folders, those of any other path in one.
-        of_data_set = any(_several_folders(of_path) for of_path, _ in found)
-        by_path = of_data_set or (self.recordings and _several_folders(scans))
-        where = partial(label_of, layouts=self.layouts) if self.labelled else lambda _: None
-        keys = relative_keys(scans) if by_path else None
-        files = iter(frames_of(scans, where, self.columns, keys))
+        has_data_set = any(_several_folders(scans_at_path) for scans_at_path, _ in found)
+        key_is_path = has_data_set or (self.recordings and _several_folders(scans))
+        label_path = partial(label_of, layouts=self.layouts) if self.labelled else lambda _: None
+        keys = relative_keys(scans) if key_is_path else None
+        files = iter(frames_of(scans, label_path, self.columns, keys))
         several = several or len(paths) > 1 or any(len(bags) > 1 for _, bags in found)
         frames: list[Frame] = []
-        for of_path, bags in found:
-            frames += islice(files, len(of_path))
+        for scans_at_path, bags in found:
+            frames += islice(files, len(scans_at_path))
             for bag in bags:
                 frames += self._clouds(bag, _bag_name(bag) if several else "")
         return frames
 
     def _clouds(self, bag: Path, prefix: str) -> Sequence[Frame]:
-        """The clouds of a bag, or at a path into one."""
+        """The clouds of a bag, or those at a path into one."""
         if self.topic is not None and is_bag(bag):
             bag /= self.topic.strip("/")
         return self.frames_of_bag(bag, self.labelled, prefix)
@@ -180,7 +179,7 @@ def source_of(
     columns: Sequence[str] = DEFAULT_COLUMNS,
     results: Sequence[Path | str] = (),
 ) -> Source:
-    """The source that a program means, with the labels that its scans have.
+    """The source of the scans that a program passes, with their labels.
 
     Args:
         scans: A source; or one or more scans in memory, frames, files and folders of scans, or URLs
@@ -189,7 +188,7 @@ def source_of(
         results: Folders or URLs of results, which are passed over in a folder of recordings.
 
     Raises:
-        InputError: No scans, something else than scans, a path that does not exist, or a folder
+        InputError: No scans, an object of another type, a path that does not exist, or a folder
             without scans.
     """
     if isinstance(scans, Source):
@@ -221,12 +220,12 @@ def source_of(
 def frame_of(
     scan: Path, columns: Sequence[str] = DEFAULT_COLUMNS, layouts: Sequence[Layout] | None = None
 ) -> FileFrame:
-    """The frame of one file, whose labels are looked for; whether it is there shows in reading.
+    """The frame of one file, with its labels if there are any. A missing file raises when read.
 
     Args:
-        scan: The file, or a path into a bag, of which the first cloud is taken that it leads to.
-        columns: Names of its columns, where it does not name them itself.
-        layouts: By which its labels are looked for; by default those of the packaged data cards.
+        scan: The file, or a path into a bag, which stands for its first cloud.
+        columns: Names of its columns, if the file does not name them.
+        layouts: Layouts by which to find its labels; by default those of the packaged data cards.
 
     Raises:
         InputError: A bag that cannot be read.
@@ -246,13 +245,13 @@ def frames_of(
     columns: Sequence[str],
     keys: Sequence[str] | None = None,
 ) -> Frames:
-    """Frames of files, each folder of which is a sequence.
+    """Frames of files; the files of one folder are a sequence.
 
     Args:
         scans: The files, in order.
-        label_path: Where the labels of a scan are to be read, if they are.
+        label_path: Returns the file of a scan's labels; None to read no labels.
         columns: Names of the columns of files that do not name them.
-        keys: What the frames are named by; None takes the stems of the files.
+        keys: Keys of the frames; None takes the stems of the files.
     """
     records = {folder: Records(folder) for folder in {scan.parent for scan in scans}}
     places = Counter[Path]()
@@ -280,7 +279,7 @@ def sequence_frames(
 
     Args:
         folders: The sequences' folders, in order.
-        layout: What the folders in them are called.
+        layout: Layout of the data set.
         columns: Names of the columns of files that do not name them.
 
     Raises:
@@ -291,10 +290,10 @@ def sequence_frames(
 
 
 def listed_scans(paths: Iterable[Path]) -> list[Path]:
-    """The scans that files and folders stand for; arguments and errors as for `find_scans`.
+    """The scans in files and folders; arguments and errors as for `find_scans`.
 
-    A warning counts what else in a folder may be a scan or a bag, for instance texts beside scans
-    of other formats.
+    A warning counts other files that may be scans or bags, for instance text files beside scans of
+    other formats.
     """
     scans: list[Path] = []
     for path in paths:
@@ -305,7 +304,7 @@ def listed_scans(paths: Iterable[Path]) -> list[Path]:
 
 
 def relative_keys(scans: Sequence[Path]) -> list[str]:
-    """Paths without suffixes, from the folder that all the scans lie below."""
+    """Paths without suffixes, relative to the common parent folder of all scans."""
     if not scans:
         return []
     places = [Path(os.path.abspath(scan)) for scan in scans]
@@ -320,28 +319,27 @@ def scan_folders(root: Path, layout: Layout) -> list[Path]:
     Args:
         root: A folder with a folder of sequences, the folder of sequences, a sequence, or its
             folder of scans.
-        layout: What the folders are called.
+        layout: Layout of the data set.
 
     Returns:
-        None of them where the root is none of this.
+        The folders; an empty list if the root is no such folder.
     """
     whole = Path(os.path.abspath(root))
     if whole.name == layout.scans and (whole.parent / layout.labels).is_dir():
         return [root]
     for sequences in (f"{escape(layout.sequences)}/*/", "*/", ""):
-        # Not Path.glob, which finds hidden folders too: what `derain simulate` has not finished.
+        # Path.glob would also find hidden folders, such as unfinished ones of `derain simulate`.
         if found := glob(f"{sequences}{escape(layout.scans)}/", root_dir=root):
             return [root / folder for folder in sorted(found)]
     return []
 
 
 def find_layout(root: Path, layouts: Iterable[Layout] | None = None) -> Layout | None:
-    """The layout that a data set, or a part of one, has; None where none is known.
+    """The layout of a data set or of a part of one; None if no layout fits.
 
     Args:
         root: As for :func:`scan_folders`.
-        layouts: Those that it may have, the likeliest first; by default those of the packaged
-            data cards.
+        layouts: Candidates, the likeliest first; by default those of the packaged data cards.
     """
     known = known_layouts() if layouts is None else layouts
     return next((layout for layout in known if scan_folders(root, layout)), None)
@@ -359,8 +357,8 @@ def recordings_below(
             over, too, and folders of texts alone.
 
     Returns:
-        Their paths, sorted; none where the path itself is what :func:`named_frames` takes: a file,
-        a folder with scans or bags directly in it, or a data set or a part of one.
+        Their paths, sorted. The list is empty if the path is a file, a folder with scans or bags
+        directly in it, or a data set or a part of one: :func:`named_frames` takes these whole.
     """
     takes_none = layouts is not None and not layouts
     if takes_none or not os.path.isdir(folder) or _holds_scans(folder) or bags_at(folder):
@@ -433,7 +431,7 @@ def _is_of_job(folder: str) -> bool:
 
 
 def _scans_or_bags(path: Path, layouts: Sequence[Layout] | None) -> tuple[list[Path], list[Path]]:
-    """The scans that a path stands for, or else its bags and paths into them."""
+    """The scans at a path, or else its bags and paths into them."""
     folders = []
     if os.path.isdir(path):
         if _holds_scans(path):
@@ -458,9 +456,9 @@ def _several_folders(scans: Iterable[Path]) -> bool:
 
 
 def _holds_scans(folder: Path) -> bool:
-    """True if scans lie directly in a folder, not only texts that may be something else.
+    """True if scans lie directly in a folder; text files do not count, for they may be notes.
 
-    It ends at the first of them: a folder of a hundred thousand scans is not listed twice.
+    The search ends at the first scan: a folder of a hundred thousand scans is not listed twice.
     """
     with reading(folder), os.scandir(folder) as entries:
         return any(
@@ -473,8 +471,8 @@ def _holds_scans(folder: Path) -> bool:
 
 
 def _warn_of_others(path: Path, taken: Sequence[Path]) -> None:
-    """Warns of what may be scans or bags in a folder, but for those that are taken."""
-    if taken == [path]:  # no folder of several
+    """Warns of possible scans and bags in a folder that are not taken."""
+    if taken == [path]:  # a file
         return
     names = {each.name for each in taken}
     with reading(path), os.scandir(path) as entries:
@@ -503,7 +501,7 @@ def _warn_of_other_folders(folder: Path, taken: Sequence[Path]) -> None:
 
 
 def _kind(entry: os.DirEntry[str]) -> str:
-    """The suffix of what may be a scan or a bag by its name; empty for anything else."""
+    """The suffix of a possible scan or bag; an empty string for anything else."""
     if entry.name.startswith(".") or entry.name in RECORDS:
         return ""
     if entry.is_dir():

@@ -1,4 +1,4 @@
-"""One scan in its sequence: what is known of it before it is read."""
+"""One scan in its sequence: its properties before it is read."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
@@ -48,11 +48,11 @@ class Frame(ABC):
     @property
     @abstractmethod
     def suffix(self) -> str:
-        """Suffix of its file's format, such as ``.pcd`` or ``.bin.gz``; empty where it has none."""
+        """Suffix of its file's format, such as ``.pcd`` or ``.bin.gz``; empty if it has none."""
 
     @property
     def time(self) -> float | None:
-        """Time at which it was taken, seconds of the recording's clock; None where it is not known.
+        """Time at which it was taken, seconds of the recording's clock; None if it is not known.
 
         Raises:
             InputError: A record of times that is damaged or does not fit the scans.
@@ -61,9 +61,9 @@ class Frame(ABC):
 
     @property
     def pose(self) -> NDArray[np.float64] | None:
-        """From the sensor's frame to one that stays where it is, float64 (4, 4), metres.
+        """Transformation from the sensor's frame to a fixed frame, float64 (4, 4), metres.
 
-        None where it is not known.
+        None if it is not known.
 
         Raises:
             InputError: A record of poses that is damaged or does not fit the scans.
@@ -73,7 +73,7 @@ class Frame(ABC):
     @property
     @abstractmethod
     def has_labels(self) -> bool:
-        """True if its labels are there to be read."""
+        """True if its labels exist and are to be read."""
 
     def require_labels(self) -> None:
         """Refuses a scan without labels, where they are needed.
@@ -139,7 +139,7 @@ class Frame(ABC):
 
     @abstractmethod
     def size(self) -> int:
-        """Bytes of what is read of it.
+        """Number of bytes to read.
 
         Raises:
             InputError: A file that is not there.
@@ -162,7 +162,7 @@ class Frame(ABC):
         return replace(self, label_path=None)
 
     def with_pose(self, pose: NDArray[np.float64]) -> Self:
-        """The same frame at a given pose, whatever lies beside the scan.
+        """The same frame at a given pose, in place of a pose in a file beside the scan.
 
         Args:
             pose: Sensor to world, float64 (4, 4), metres.
@@ -172,7 +172,7 @@ class Frame(ABC):
     def with_intensity_times(self, factor: float) -> Self:
         """The same frame, whose intensities are read in another unit.
 
-        What is written of the scan is as it was in its file: see
+        Written scans keep the intensities of their file: see
         :meth:`derain.scan.Scan.with_intensity_times`.
 
         Args:
@@ -238,8 +238,10 @@ class MemoryFrame(Frame):
         columns = (self.scan.xyz, self.scan.intensity)
         points = b"".join(np.ascontiguousarray(c).tobytes() for c in columns if c is not None)
         label = self.scan.label if self.has_labels else None
-        of_label = None if label is None else sha256(label.astype("<i8").tobytes()).hexdigest()
-        return sha256(points).hexdigest(), of_label
+        label_checksum = (
+            None if label is None else sha256(label.astype("<i8").tobytes()).hexdigest()
+        )
+        return sha256(points).hexdigest(), label_checksum
 
     def size(self) -> int:
         """Bytes of its coordinates."""

@@ -17,15 +17,15 @@ class Judgement:
 
     Attributes:
         probability: That each point is rain, float32 (N,); 0 for rows that were not judged. Of a
-            method that gives no probabilities, 1 for what it calls rain.
-        rain: True for rain, bool (N,). What is not known is never called rain: where ``known`` is
-            False, so is this, whatever was given.
+            method that gives no probabilities, 1 for points that it calls rain.
+        rain: True for rain, bool (N,). It is False where ``known`` is False, whatever value the
+            constructor receives.
         judged: True for rows that the method saw, bool (N,): not for those that cannot be judged,
             nor for points outside the grid of an image.
         scan: The scan.
         frame: Its frame; None where points were judged by themselves.
-        known: True for rows of whose answer the method is sure, bool (N,). None of a method that
-            knows no doubt.
+        known: True for rows of which the method is sure, bool (N,). None for a method that is
+            always sure.
     """
 
     probability: NDArray[np.float32]

@@ -12,13 +12,13 @@ from derain.sources.method import Method
 from derain.sources.recent_frames import ScanError
 from derain.system.stopwatch import Stopwatch
 
-# Surrounds the work on a frame, so that one that fails can be reported and passed over.
+# Context manager around the work on a frame: it can report a failure, so that the others continue.
 Guard = Callable[[Frame], AbstractContextManager[None]]
 
 # A frame, its judgement, and the times of the stages since the answer before.
 Answer = tuple[Frame, Judgement, Stopwatch]
 
-# The same, where a frame may have an error in place of a judgement.
+# A frame's judgement, or its error.
 AnswerOrError = tuple[Frame, Judgement | InputError, Stopwatch]
 
 
@@ -28,7 +28,7 @@ def unguarded(frame: Frame) -> AbstractContextManager[None]:
 
 
 class Failures:
-    """Collects the errors of single frames, so that the others go on.
+    """Collects the errors of single frames, so that the others continue.
 
     Args:
         report: Called with each error.
@@ -81,14 +81,14 @@ def judgements(
 
 
 def answers(method: Method, frames: Iterable[Frame]) -> Iterator[AnswerOrError]:
-    """Judges the frames of recordings, and goes on after those that cannot be read or judged.
+    """Judges the frames of recordings, and continues after frames that cannot be read or judged.
 
     Args:
         method: The method.
         frames: Frames in time order, one sequence after the other.
 
     Yields:
-        Each frame as soon as it is judged or met by an error.
+        Each frame as soon as it is judged, or has failed with an error.
     """
     last = None
     for frame in frames:
@@ -99,7 +99,7 @@ def answers(method: Method, frames: Iterable[Frame]) -> Iterator[AnswerOrError]:
             with reading(Path(frame.name)):  # which names the file where the memory is full
                 judgement = method.push(frame, stopwatch)
         except InputError as error:
-            yield _met_by(error, frame), error, stopwatch
+            yield _failed_frame(error, frame), error, stopwatch
         if judgement is not None:
             yield _frame_of(judgement), judgement, stopwatch
     if last is not None:
@@ -108,7 +108,7 @@ def answers(method: Method, frames: Iterable[Frame]) -> Iterator[AnswerOrError]:
 
 def _flushed(method: Method, last: Frame) -> Iterator[AnswerOrError]:
     """The answers for the frames that wait, after the last of a recording was pushed."""
-    while method.waiting:  # where one fails, the others go on waiting
+    while method.waiting:  # if one fails, the others keep waiting
         stopwatch = Stopwatch()
         try:
             with reading(Path(last.name)):
@@ -116,11 +116,11 @@ def _flushed(method: Method, last: Frame) -> Iterator[AnswerOrError]:
                     yield _frame_of(judgement), judgement, stopwatch
                     stopwatch.milliseconds.clear()
         except InputError as error:
-            yield _met_by(error, last), error, stopwatch
+            yield _failed_frame(error, last), error, stopwatch
 
 
-def _met_by(error: InputError, pushed: Frame) -> Frame:
-    """The frame that an error is about: the one that was judged, or else the one pushed last."""
+def _failed_frame(error: InputError, pushed: Frame) -> Frame:
+    """The frame that caused an error: the one that was judged, or else the one pushed last."""
     return error.frame if isinstance(error, ScanError) else pushed
 
 

@@ -19,8 +19,8 @@ from derain.system.stopwatch import Stopwatch
 from derain.views.scan_issues import ScanIssue, much_removed
 from derain.views.window import Window
 
-# One scan in so many is examined, the first among them. It takes 3 to 7 milliseconds of 116,000
-# points, a tenth of what a filter takes; the scans of one sensor mostly have the same fault.
+# The first scan is examined, and then one in this number. It takes 3 to 7 milliseconds for 116,000
+# points, a tenth of a filter's time; the scans of one sensor mostly have the same fault.
 EXAMINE_EVERY = 100
 
 
@@ -40,9 +40,9 @@ class Method(ABC):
     :func:`derain.sources.judging.judgements` does it.
 
     Attributes:
-        EXAMINE_EVERY: One scan in so many is examined for what :meth:`issues` gives.
-        warns: True if it warns of that, by :class:`~derain.errors.ScanWarning`. What prints the
-            issues itself sets it to False.
+        EXAMINE_EVERY: One scan in this number is examined for :meth:`issues`.
+        warns: True to warn of issues, by :class:`~derain.errors.ScanWarning`. Callers that print
+            the issues themselves set it to False.
     """
 
     EXAMINE_EVERY: ClassVar[int] = EXAMINE_EVERY
@@ -84,7 +84,7 @@ class Method(ABC):
             stopwatch: Takes the times of the stages, such as read, view, network and back.
 
         Returns:
-            The judgement of the frame that has all of its window by now; None until there is
+            The judgement of the frame whose window is now complete; None until there is
             one.
 
         Raises:
@@ -95,8 +95,8 @@ class Method(ABC):
     def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
         """Ends a recording: answers for the frames that still wait, with the scans that there are.
 
-        What is pushed afterwards is of another recording. Where one of those that wait cannot be
-        judged, those after it go on waiting.
+        Frames pushed afterwards belong to another recording. If a waiting frame cannot be judged,
+        the frames after it keep waiting.
 
         Args:
             stopwatch: Takes the times of the stages.
@@ -114,18 +114,18 @@ class Method(ABC):
         """
 
     def with_warnings(self, judgement: Judgement) -> Judgement:
-        """Returns a judgement, after a warning of each kind of fault that no scan had before."""
+        """Returns a judgement, and warns of each kind of issue that no scan had before."""
         if not self.warns:
             return judgement
-        odd = [*much_removed(judgement.share_of_rain)]
+        issues = [*much_removed(judgement.share_of_rain)]
         if self._scans_checked % self.EXAMINE_EVERY == 0:
-            odd += self.issues(judgement)
+            issues += self.issues(judgement)
         self._scans_checked += 1
-        for issue in odd:
+        for issue in issues:
             if issue.kind not in self._warned_of:
                 self._warned_of.add(issue.kind)
                 text = f"{judgement.scan.name}: {issue.detail}"
-                warnings.warn(text, ScanWarning, stacklevel=_level_of_the_user())
+                warnings.warn(text, ScanWarning, stacklevel=_stack_level_of_caller())
         return judgement
 
     @cached_property
@@ -137,10 +137,10 @@ class Method(ABC):
         """Number of scans around one on which its answer depends.
 
         Args:
-            recording: Frames of which each follows the one before it.
+            recording: Frames; each follows the one before it.
 
         Returns:
-            Numbers of scans before and after; None where it may depend on all of them, as here.
+            Numbers of scans before and after; None if it may depend on all of them, as here.
         """
         return None
 
@@ -159,7 +159,7 @@ class Method(ABC):
         """
 
 
-def _level_of_the_user() -> int:
+def _stack_level_of_caller() -> int:
     """The level of the stack, as warnings.warn counts from who calls this, outside derain."""
     level, frame = 1, sys._getframe(1)
     while frame.f_back and frame.f_globals.get("__name__", "").startswith("derain."):

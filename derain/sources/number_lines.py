@@ -14,7 +14,7 @@ LARGEST_RECORD = 2**26
 
 
 def read_numbers(path: Path, *columns: int) -> NDArray[np.float64]:
-    """Reads lines of so many finite numbers each; empty ones and remarks (#) are passed over.
+    """Reads lines of finite numbers; empty lines and comments (#) are skipped.
 
     Args:
         path: The file.

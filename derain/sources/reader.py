@@ -58,7 +58,7 @@ class FrameReader:
         return scan.take(first_rows(scan))
 
     def with_labels(self, scan: Scan, frame: Frame) -> Scan:
-        """The scan with the labels of its frame, all of which are on the data card."""
+        """The scan with the labels of its frame; the data card defines all of them."""
         label = frame.read_label(len(scan))
         if frame.label_map is not None:
             label = frame.label_map(label, str(frame.label_path or frame.name))

@@ -60,23 +60,23 @@ class ScanError(InputError):
 
 
 class RecentFrames:
-    """Takes frame after frame, and gives each back once those after it are there.
+    """Takes frame after frame, and returns each once the frames after it have arrived.
 
     A frame that does not follow the one before it, in another sequence or with some missing
     between, starts a new recording: no window reaches over the gap.
 
     Args:
-        window: Frames before and after one that are to be seen with it.
+        window: Number of frames before and after each that are used with it.
     """
 
     def __init__(self, window: Window) -> None:
         self.window = window
         self._kept: deque[tuple[Frame, PlacedScan]] = deque()
-        self._given = 0  # so many of those kept were given back, and are there for later ones
+        self._given = 0  # number of kept frames already returned; later frames still need them
 
     @property
     def waiting(self) -> int:
-        """Number of frames that were taken and not given back."""
+        """Number of frames that were taken and not returned yet."""
         return len(self._kept) - self._given
 
     @property
@@ -96,7 +96,7 @@ class RecentFrames:
             placed: Its scan, and when and where it was taken as far as that is needed.
 
         Returns:
-            The frame that has all its window by now, if there is one.
+            The frame whose window is now complete, if there is one.
         """
         if self.starts_new_recording(frame):
             self._kept.clear()

@@ -1,6 +1,6 @@
-"""Frames by the recordings that they are of, and whether these are fit to be seen several at once.
+"""Divides frames into recordings, and checks their order and spacing in time.
 
-Most methods see one scan at a time and need none of this; the alarm of the weather does.
+Methods that use several scans and the warnings of bad weather need this; most methods use one scan.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -12,17 +12,17 @@ from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
 from derain.views.window import Window
 
-# Seconds. Scans come ten or twenty times in one; after more than one, a car has gone so far that a
-# scan shows little of the place of another's points.
+# Seconds. Sensors take ten or twenty scans per second. In more than one second, a car drives so far
+# that two scans have few places in common.
 LONGEST_STEP = 1.0
 
-# The same where the numbers of files stand for times, as a multiple of their smallest step: a
-# second at ten scans a second.
+# The same limit for numbered files without times, in multiples of their smallest step: one second
+# at ten scans per second.
 LONGEST_NUMBER_STEP = 10
 
 
 def recordings_of(frames: Iterable[Frame]) -> list[list[Frame]]:
-    """Frames in groups, in each of which every frame follows the one before it."""
+    """Groups frames: in each group, every frame follows the one before it."""
     recordings: list[list[Frame]] = []
     for frame in frames:
         if not (recordings and frame.follows(recordings[-1][-1])):
@@ -32,11 +32,11 @@ def recordings_of(frames: Iterable[Frame]) -> list[list[Frame]]:
 
 
 def unbroken_recordings(frames: Iterable[Frame]) -> list[list[Frame]]:
-    """Scans in groups, in each of which every scan was taken soon after the one before it.
+    """Groups scans: in each group, every scan was taken soon after the one before it.
 
-    Times decide, or else the names of files, where all of a folder are numbers: these rise, and no
-    step is more than ten times the smallest one. Scans with neither are in no group, nor is one
-    alone.
+    The times of the scans decide. Without times, file names decide if all of a folder are numbers:
+    the numbers rise, and no step is more than ten times the smallest one. Scans with neither times
+    nor numbers are in no group, and there are no groups of one scan.
 
     Args:
         frames: Frames in time order, one recording after the other.
@@ -49,12 +49,15 @@ def unbroken_recordings(frames: Iterable[Frame]) -> list[list[Frame]]:
 
 
 def irregularities(frames: Iterable[Frame], window: Window) -> Iterator[str]:
-    """What of recordings does not suit a method that sees several scans, a sentence each.
+    """Describes faults of recordings that harm a method that uses several scans.
 
     Args:
         frames: Frames in time order, one recording after the other.
-        window: How many scans the method needs. For one alone, everything suits, and nothing is
+        window: Scans that the method needs. If it needs one, there are no faults, and nothing is
             read.
+
+    Yields:
+        One sentence for each fault.
     """
     if window.is_one_scan:
         return
@@ -63,16 +66,16 @@ def irregularities(frames: Iterable[Frame], window: Window) -> Iterator[str]:
     if short:
         others = f" ({len(short):,} recordings are as short)" if len(short) > 1 else ""
         yield (
-            f"{short[0][0].name}: {_scans(len(short[0]))} in its recording{others}, where each is "
-            f"judged by {window.before} before and {window.after} after it: without them less is "
-            "known"
+            f"{short[0][0].name}: {_scans(len(short[0]))} in its recording{others}; the method "
+            f"uses {window.before} scans before and {window.after} after each, and is less sure "
+            "without them"
         )
     for recording in recordings:
-        yield from _of_steps(recording)
+        yield from _irregular_steps(recording)
 
 
 def _unbroken(recording: Sequence[Frame]) -> list[list[Frame]]:
-    """A recording in the parts that breaks in time divide it into."""
+    """Divides a recording where there is a break in time."""
     try:
         times = _times(recording)
     except InputError:
@@ -91,19 +94,19 @@ def _unbroken(recording: Sequence[Frame]) -> list[list[Frame]]:
     return parts
 
 
-def _of_steps(recording: Sequence[Frame]) -> Iterator[str]:
-    """What of the steps from scan to scan does not suit: the first of each kind."""
+def _irregular_steps(recording: Sequence[Frame]) -> Iterator[str]:
+    """Describes the first step in time of each kind that harms the method."""
     try:
         times = _times(recording)
-    except InputError as error:  # the method may well do without
-        yield f"{recording[0].name}: when it was taken is not known: {error}"
+    except InputError as error:  # the method may not need times
+        yield f"{recording[0].name}: its time is not known: {error}"
         return
     steps = _steps(times or _numbers(recording) or [])
     backwards = [frame for frame, step in zip(recording[1:], steps, strict=False) if step <= 0]
     if backwards:
         yield (
             f"{backwards[0].name}: not later than the scan before it ({_scans(len(backwards))} in "
-            "all): name them in the order that they were taken in"
+            "all): name the scans in time order"
         )
     if not times:
         return
@@ -111,25 +114,25 @@ def _of_steps(recording: Sequence[Frame]) -> Iterator[str]:
     if apart:
         yield (
             f"{apart[0].name}: more than {LONGEST_STEP:g} s after the scan before it "
-            f"({_scans(len(apart))} in all): they say little of one another"
+            f"({_scans(len(apart))} in all): such scans have little in common"
         )
 
 
 def _times(recording: Sequence[Frame]) -> list[float] | None:
-    """When the scans were taken, seconds; None where that is not known of all."""
+    """Times of the scans, seconds; None unless all are known."""
     times = [time for frame in recording if (time := frame.time) is not None]
     return times if len(times) == len(recording) else None
 
 
 def _numbers(recording: Sequence[Frame]) -> list[int] | None:
-    """The numbers that the files are named by; None where not all are."""
+    """Numbers that are the names of the files; None unless all names are numbers."""
     names = [scan_stem(frame.path) for frame in recording if isinstance(frame, FileFrame)]
     digits = [name for name in names if name.isascii() and name.isdigit()]
     return list(map(int, digits)) if len(digits) == len(recording) else None
 
 
 def _steps(places: Sequence[float]) -> list[float]:
-    """How far each scan but the first is from the one before it."""
+    """Difference of each place but the first to the one before it."""
     return [after - before for before, after in pairwise(places)]
 
 

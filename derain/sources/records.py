@@ -68,7 +68,7 @@ class Records:
         return " ".join(stamp_of(path) for path in places if path is not None and is_file(path))
 
     def __reduce__(self) -> tuple[Callable[[Path], "Records"], tuple[Path]]:
-        return records_of, (self.folder,)  # what is read stays where it was read
+        return records_of, (self.folder,)  # a copy in another process reads them again
 
     @cached_property
     def _times(self) -> NDArray[np.float64] | None:
@@ -143,7 +143,7 @@ def line_of(record: Path, lines: int, scan: str, place: int | None, scans: int) 
         record: The record, for messages.
         lines: Number of lines that it has.
         scan: Name of the scan's file.
-        place: The scan's place among all of its sequence; None where it is not one of them.
+        place: The scan's place among all of its sequence; None if it is not one of them.
         scans: Their number.
 
     Raises:

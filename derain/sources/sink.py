@@ -1,4 +1,4 @@
-"""Folders that take what is made of frames, each file by the key of its frame."""
+"""Folders for the results of frames; each file is named by the key of its frame."""
 
 import os
 from collections.abc import Iterable, Iterator
@@ -26,7 +26,7 @@ class FolderSink:
         folder: The folder, made if missing.
         option: The user's name for it, for messages.
         again: True if a source may give a scan twice, as where two patterns find it.
-        removed: Folder for what is taken away of the scans, named like these; None to drop it.
+        removed: Folder for the removed points, named like the scans; None to write none.
     """
 
     def __init__(
@@ -60,8 +60,8 @@ class FolderSink:
         """Refuses, before any work, to overwrite a scan or labels of the source, or one result.
 
         Raises:
-            InputError: What is made of one frame would take the place of a scan, of labels, or of
-                what is made of another frame.
+            InputError: The results of a frame would overwrite a scan, labels, or the results of
+                another frame.
         """
         if self.removed is not None and _is_same(self.removed, self.folder):
             raise InputError(
@@ -79,7 +79,7 @@ class FolderSink:
             if other is not frame and not (self.again and _is_one_file(other, frame)):
                 raise InputError(
                     frame.name,
-                    f"another scan has the same name: what is made of it and of {other.name} would "
+                    f"another scan has the same name: its results and those of {other.name} would "
                     f"both be {url_of(target)}",
                     f"Take them in two runs, each to its {self.option}.",
                 )
@@ -87,13 +87,13 @@ class FolderSink:
     def write(
         self, frame: Frame, scan: Scan | None, label: NDArray[Any], removed: Scan | None = None
     ) -> None:
-        """Writes the scans, then the labels: where there are labels, the scans are complete.
+        """Writes the scans, then the labels: if the labels exist, the scans are complete.
 
         Args:
             frame: The frame.
             scan: The cleaned scan; None where only labels are of interest.
             label: Class ids or a bool mask of the scan that the labels are for, (N,).
-            removed: The removed points of the scan; None where it is dropped.
+            removed: The removed points of the scan; None if they are dropped.
 
         Raises:
             InputError: It cannot be written.
@@ -135,7 +135,7 @@ class LabelSink(FolderSink):
     """
 
     def refuse_clashes(self, source: Iterable[Frame]) -> None:
-        """Refuses to overwrite labels that are there, or one result by another."""
+        """Refuses to overwrite existing labels, or one result by another."""
         frames = list(source)
         # Not Path.is_file, which raises where the name has become too long by its suffix.
         there = {os.path.realpath(label) for label in _labels_of(frames) if os.path.isfile(label)}
@@ -144,13 +144,13 @@ class LabelSink(FolderSink):
             if os.path.realpath(target) in there:
                 raise InputError(
                     self.folder,
-                    f"what is found for {frame.name} would overwrite the labels {target}",
+                    f"the results of {frame.name} would overwrite the labels {target}",
                     f"Give {self.option} another folder.",
                 )
         super().refuse_clashes(frames)
 
     def _refuse_own_files(self, frame: FileFrame) -> None:
-        """No scan is written, and of labels only those matter that are there."""
+        """Checks existing labels alone, because no scan is written."""
 
 
 def _is_same(one: Path, other: Path) -> bool:
@@ -172,7 +172,7 @@ def _real_folder(folder: str) -> str:
 
 
 def _is_one_file(one: Frame, other: Frame) -> bool:
-    """True if two frames are of the same file, so that what is made of them is the same."""
+    """True if two frames are of the same file, and thus have the same results."""
     return isinstance(one, FileFrame) and isinstance(other, FileFrame) and one.name == other.name
 
 

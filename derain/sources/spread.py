@@ -9,7 +9,7 @@ Item = TypeVar("Item")
 
 
 def evenly_spaced(items: Sequence[Item], most: int) -> list[Item]:
-    """At most so many items, spread over the whole sequence.
+    """At most ``most`` items, spread over the whole sequence.
 
     Args:
         items: The items, in order.

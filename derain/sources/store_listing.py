@@ -23,7 +23,7 @@ from derain.stores.objects import StoredObject, listed
 from derain.stores.url import Place, is_url, without_secrets
 from derain.system.notices import changed_warnings
 
-# What is read to list scans and bags, or for the times and poses of scans.
+# Files that are fetched to list scans and bags, or for the times and poses of scans.
 READ_WHEN_LISTED = (*RECORDS, BAG_METADATA)
 
 Value = TypeVar("Value")
@@ -41,8 +41,8 @@ def frames_at(
         places: As :func:`~derain.sources.folders.named_frames` takes them, all of them paths or all
             of them URLs.
         columns: Names of the columns of files that do not name them.
-        topic: Topic of the bags among them; None where they have only one of clouds.
-        results: Folders or URLs of results, which are passed over in a folder of recordings.
+        topic: Topic of the bags among them; None if they have only one of clouds.
+        results: Folders or URLs of results, which are skipped in a folder of recordings.
 
     Raises:
         InputError: As :func:`~derain.sources.folders.named_frames` raises it; a store that cannot
@@ -60,32 +60,32 @@ def frames_at(
             f"is in a store, and {other} is not",
             "Clean them by two commands.",
         )
-    with mirror() as lent, changed_warnings(lent.with_urls):
-        listing = _Listing(lent, (stored for url in urls for stored in listed(url)))
-        stored = tuple(lent.path_of(str(folder)) for folder in results if is_url(folder))
+    with mirror() as local, changed_warnings(local.with_urls):
+        listing = _Listing(local, (stored for url in urls for stored in listed(url)))
+        stored = tuple(local.path_of(str(folder)) for folder in results if is_url(folder))
         finder = FrameFinder(columns, topic=topic, results=stored, frames_of_bag=listing.bag)
-        return listing.stored(finder.frames([lent.path_of(url) for url in urls]))
+        return listing.stored(finder.frames([local.path_of(url) for url in urls]))
 
 
 class _Listing:
-    """Objects of stores, and a mirror that shows which there are.
+    """Objects of stores, and a mirror with their paths.
 
     Args:
-        lent: An empty mirror.
-        objects: The objects; hidden ones are passed over, but for the file that shows a folder to
-            have records of a job.
+        local: An empty mirror.
+        objects: The objects. Hidden ones are skipped, except the file that marks a folder with
+            records of a job.
     """
 
-    def __init__(self, lent: Mirror, objects: Iterable[StoredObject]) -> None:
-        self._lent = lent
-        self._root = lent.root
+    def __init__(self, local: Mirror, objects: Iterable[StoredObject]) -> None:
+        self._local = local
+        self._root = local.root
         self._stamps: dict[Path, str] = {}
         stored = [(each.path, each) for each in objects]
         self._objects = {path: each for path, each in stored if not _is_hidden(path)}
         read = {path for path in self._objects if path.name in READ_WHEN_LISTED}
         jobs = (path for path, _ in stored if path.match(f"{FOLDER}/{JOB}"))
-        lent.mark(chain((path for path in self._objects if path not in read), jobs))
-        lent.fetch(self._objects[path] for path in read)
+        local.mark(chain((path for path in self._objects if path not in read), jobs))
+        local.fetch(self._objects[path] for path in read)
 
     def bag(self, path: Path, labelled: bool, prefix: str) -> list[Frame]:
         """The bag that a path of the mirror leads into, as one frame."""
@@ -106,9 +106,9 @@ class _Listing:
 
     def stored(self, frames: Iterable[Frame]) -> Frames:
         """Frames of the mirror as frames of their stores, for which the mirror is not needed."""
-        return Frames(map(self._of_store, frames))
+        return Frames(map(self._stored_frame, frames))
 
-    def _of_store(self, frame: Frame) -> Frame:
+    def _stored_frame(self, frame: Frame) -> Frame:
         if isinstance(frame, StoredBag):
             return frame
         assert isinstance(frame, FileFrame)
@@ -142,7 +142,7 @@ class _Listing:
         try:
             return value()
         except InputError as error:
-            return self._lent.error_with_urls(error)
+            return self._local.error_with_urls(error)
 
 
 def _is_hidden(path: Path) -> bool:

@@ -34,7 +34,7 @@ class StoredFrame(FileFrame):
 
     @abstractmethod
     def fetched(self, where: Mirror) -> list[FileFrame]:
-        """The frames that it stands for, of which all is on this machine.
+        """The frames that it stands for, with all their files on this machine.
 
         Args:
             where: Place of its objects.
@@ -107,8 +107,8 @@ class StoredBag(StoredFrame):
     """All clouds of a topic of a bag in an object store, which are not known before it is fetched.
 
     Attributes:
-        inner: The topic, as a part of a path; empty where the bag has only one of clouds.
-        prefix: First part of the keys of its clouds; empty where the bag is the only one.
+        inner: The topic, as a part of a path; empty if the bag has only one of clouds.
+        prefix: First part of the keys of its clouds; empty if the bag is the only one.
         seconds: Time of the cloud; None for all clouds.
         trajectory: Poses of the clouds, where they are given.
     """
@@ -159,7 +159,7 @@ class StoredBag(StoredFrame):
         return f"{super().stamp()} {poses}"
 
     def cloud(self, key: str, name: str, seconds: float | None) -> Self:
-        """One of its clouds, of which only that is known.
+        """One of its clouds, by its key, name and time alone.
 
         Args:
             key: Its key.

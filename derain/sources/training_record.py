@@ -1,4 +1,4 @@
-"""The record of the scans that a network was trained on, so that none is measured unawares.
+"""The record of the scans that a network was trained on, for a warning if it is measured on them.
 
 Sequences of a published data set are recorded by their names, and all other scans by fingerprints
 of their files: folders of different data may be named the same.
@@ -14,7 +14,7 @@ from derain.spec import Spec
 # What a record holds: names of sequences, and fingerprints of scans.
 SEQUENCES, SCANS = "sequences", "scans"
 
-# A Spec is a small document: of more scans than these, so many are recorded, evenly spread.
+# A Spec is a small document: of more scans than these, this number is recorded, evenly spread.
 MOST_NAMES = 2000
 
 
@@ -67,7 +67,7 @@ def training_overlap(title: str, spec: Spec, card: DataCard, frames: Sequence[Fr
         frames: The scans.
 
     Returns:
-        One sentence; None where it was trained on none of the scans, or nothing is known of it.
+        One sentence; None if it was trained on none of the scans, or nothing is known of it.
 
     Raises:
         InputError: A scan that cannot be read.

@@ -127,7 +127,7 @@ def read_trajectory(path: Path) -> Trajectory:
     """
     rows = read_numbers(path, TUM, KITTI)
     if rows.shape[1] == TUM:
-        return _of_tum(path, rows)
+        return _trajectory_of_tum(path, rows)
     poses = _motions(path, rows)
     calibration = path.with_name(CALIBRATION)
     if is_file(calibration):
@@ -166,7 +166,7 @@ def _words(numbers: NDArray[np.float64]) -> str:
     return " ".join(f"{number:.12g}" for number in numbers)
 
 
-def _of_tum(path: Path, rows: NDArray[np.float64]) -> Trajectory:
+def _trajectory_of_tum(path: Path, rows: NDArray[np.float64]) -> Trajectory:
     times, quaternions = rows[:, 0], rows[:, 4:]
     if not (np.diff(times) > 0).all():
         place = int(np.argmin(np.diff(times) > 0)) + 2

@@ -46,10 +46,10 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
             unit.fetched() as (here, with_urls),
             self.destination.opened(Frames(here.frames)) as (sink, uploaded),
         ):
-            for outcome in self._knowing_clouds(unit, here).clean(here, sink):
+            for outcome in self._with_cloud_counts(unit, here).clean(here, sink):
                 if outcome.error is not None:
                     outcome = replace(outcome, error=with_urls(outcome.error))
-                if self.destination.is_stored:  # what is not uploaded yet is not done
+                if self.destination.is_stored:  # a scan is done once it is uploaded
                     held.append(outcome)
                 else:
                     yield outcome
@@ -86,7 +86,7 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
             )
 
     def look(self) -> IsThere[FrameUnit, ScanOutcome]:
-        """Looks at what is written by now."""
+        """Looks up the results written so far."""
         stamps = self.destination.stamps()
 
         def is_there(unit: FrameUnit, outcomes: list[ScanOutcome]) -> bool:
@@ -118,12 +118,12 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
             uploaded=written["uploaded"],
         )
 
-    def _knowing_clouds(self, unit: FrameUnit, here: FrameUnit) -> "UnitCleaning":
-        """The same where the clouds of a bag are not known before now.
+    def _with_cloud_counts(self, unit: FrameUnit, here: FrameUnit) -> "UnitCleaning":
+        """The same, completed for a bag in a store, whose clouds are known only after fetching it.
 
         Args:
             unit: The unit.
-            here: The same with frames of this machine.
+            here: The unit with frames of this machine.
         """
         if not isinstance(unit.frames[0], StoredBag):
             return self

@@ -19,8 +19,8 @@ from derain.views.scan_issues import ScanIssue
 
 ResultT = TypeVar("ResultT", bound=Result)
 
-# Finds where the scans of whole recordings were taken: each frame with its pose, in order, and what
-# is odd about it.
+# Finds the poses of whole recordings: returns each frame with its pose, in order, and the issues of
+# the pose.
 Placing = Callable[[Sequence[Frame]], Iterable[tuple[Frame, Sequence[ScanIssue]]]]
 
 
@@ -52,7 +52,7 @@ class UnitJudging(Work[FrameUnit, ResultT]):
         """The result of a scan that failed."""
 
     def failed(self, unit: FrameUnit, error: InputError) -> ResultT:
-        """The result of a unit that failed as a whole, which is that of its first scan."""
+        """The result of a unit that failed as a whole: the failure of its first scan."""
         return self.failure(unit.frames[0], error)
 
     def results(
@@ -61,7 +61,7 @@ class UnitJudging(Work[FrameUnit, ResultT]):
         """Judges the scans of a unit, and makes a result of each.
 
         Args:
-            unit: The unit, whose frames have poses by now.
+            unit: The unit; its frames already have poses.
             result: Makes it of a frame, its judgement, and the times of the stages.
         """
         for frame, answer, stopwatch in self.judged(unit):
@@ -93,7 +93,7 @@ class UnitJudging(Work[FrameUnit, ResultT]):
             yield frame, none, Stopwatch()
 
     def placed(self, unit: FrameUnit) -> tuple[FrameUnit, Mapping[str, Sequence[ScanIssue]]]:
-        """The unit with poses, and what is odd about them, by the keys of the frames."""
+        """The unit with poses, and the issues of the poses, by the keys of the frames."""
         if self.placing is None:
             return unit, {}
         issues = {}

@@ -43,7 +43,7 @@ class Division:
         block: Scans of a block of a long recording.
         shard: The shard of the units that is done; None for all.
         keep_records: True if records are kept even of fewer scans than a block has.
-        anew: True if everything is done again, even if the records are of other options.
+        anew: True to do everything again, even if the records are of other options.
     """
 
     block: int = BLOCK
@@ -115,11 +115,11 @@ class FrameUnit(Unit):
         """Lends the unit with all files on this machine, while the block runs.
 
         Yields:
-            The unit, and what names URLs in errors in place of its files.
+            The unit, and a function that replaces its files by URLs in errors.
 
         Raises:
             InputError: A scan or a bag of a store cannot be fetched whole. Then nothing of the unit
-                is done, for what is found of one scan may depend on the others.
+                is done, because the result of one scan may depend on the others.
         """
         frames = (*self.before, *self.frames, *self.after)
         stored = [frame for frame in frames if isinstance(frame, StoredFrame)]
@@ -141,8 +141,8 @@ class FrameUnit(Unit):
 def units_of(source: Sequence[Frame], method: Method | None, block: int = BLOCK) -> list[FrameUnit]:
     """Splits a source so that the method judges each unit as it would judge the whole source.
 
-    A bag is one unit, for it is written as a whole, and so is a recording of which every scan may
-    depend on all others. Other recordings are split into blocks of scans.
+    A bag is one unit, because it is written as a whole. A recording is one unit if the result of
+    each scan may depend on all others. Other recordings are split into blocks of scans.
 
     Args:
         source: Frames in time order, one recording after the other.
@@ -179,7 +179,7 @@ def shared_options(command: str, source: Sequence[Frame], block: int) -> dict[st
 
 
 def folder_of_paths(source: Sequence[Frame], *places: Place) -> Path | None:
-    """The folder that relative paths begin in; None where there are none.
+    """The folder that relative paths start from; None if there are none.
 
     Args:
         source: The scans.

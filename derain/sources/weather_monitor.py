@@ -22,7 +22,7 @@ class WeatherOptions:
     """Options for measuring the weather of a recording.
 
     Attributes:
-        every_scan: True if every scan is measured; otherwise SAMPLED_SCANS are, for the weather of
+        every_scan: True to measure every scan; otherwise SAMPLED_SCANS are, for the weather of
             all scans together.
         warning: Bounds of the warning.
         error: Bounds of the error.

@@ -40,7 +40,7 @@ class FileDocuments:
         self._folder = folder
 
     def read(self, name: str) -> bytes | None:
-        """The content of a document; None where it is not there, or cannot be read."""
+        """The content of a document; None if it is missing or cannot be read."""
         with suppress(OSError):
             return (self._folder / name).read_bytes()
         return None
@@ -50,7 +50,7 @@ class FileDocuments:
         yield from map(self.read, names)
 
     def write(self, name: str, text: str) -> None:
-        """Writes a document whole, over one that is there.
+        """Writes a whole document, and replaces an existing one.
 
         Raises:
             InputError: It cannot be written.
@@ -59,7 +59,7 @@ class FileDocuments:
             temporary.write_text(text, "utf-8")
 
     def create(self, name: str, text: str) -> None:
-        """Writes a document unless it is there; which one is there, only reading it shows.
+        """Writes a document unless it exists; read it back to find which one was kept.
 
         Raises:
             InputError: It cannot be written.
@@ -98,7 +98,7 @@ class ObjectDocuments:
         self._url = url
 
     def read(self, name: str) -> bytes | None:
-        """The content of a document; None where it is not there."""
+        """The content of a document; None if it is missing."""
         filesystem, folder = opened_folder(self._url)
 
         def content() -> bytes | None:
@@ -112,7 +112,7 @@ class ObjectDocuments:
         return tried(f"{self._url}/{name}", content)
 
     def read_each(self, names: Sequence[str]) -> Iterator[bytes | None]:
-        """The contents of many, some read at once; one listing shows which are there."""
+        """The contents of many documents, several read at a time; one listing finds them."""
         filesystem, folder = opened_folder(self._url)
         keys = tried(self._url, lambda: filesystem.find(folder))
         there = {key[len(folder) + 1 :] for key in keys}
@@ -128,13 +128,13 @@ class ObjectDocuments:
         tried(f"{self._url}/{name}", lambda: filesystem.pipe_file(f"{folder}/{name}", content))
 
     def create(self, name: str, text: str) -> None:
-        """Writes a document unless it is there."""
+        """Writes a document unless it exists."""
         if self.read(name) is not None:
             return
         filesystem, folder = opened_folder(self._url)
         try:
             filesystem.pipe_file(f"{folder}/{name}", text.encode(), mode="create")
-        except Exception:  # it is there by now, the request failed, or the store has no such mode
+        except Exception:  # it exists, the request failed, or the store has no such mode
             if self.read(name) is None:
                 self.write(name, text)
 

@@ -44,7 +44,7 @@ class Mirror:
         """Makes an empty file for each object: enough to see which there are.
 
         Args:
-            paths: The paths that stand for their URLs, none of which is to be fetched.
+            paths: The paths that stand for the objects' URLs. No object is fetched.
 
         Raises:
             InputError: A path is too long for a file, or both a file and a folder.
@@ -60,7 +60,7 @@ class Mirror:
                     folder.mkdir(parents=True, exist_ok=True)
                 try:
                     os.link(empty, file)  # takes a tenth of the time to make a file
-                except OSError:  # a file may have only so many links, or none
+                except OSError:  # the number of links to a file is limited, perhaps to none
                     file.touch()
                     empty = file
 
@@ -93,12 +93,12 @@ def mirror() -> Iterator[Mirror]:
 
 @contextmanager
 def uploaded(place: Place, stamps: dict[str, str]) -> Iterator[Path]:
-    """Lends the folder of a place to be written to.
+    """Provides a folder to write to for a place.
 
     Args:
-        place: A folder, which is lent itself; or a URL, for which a temporary folder is lent, whose
+        place: A folder, which is used itself; or a URL, which gets a temporary folder, whose
             files are uploaded when the block ends well.
-        stamps: Takes the sizes and versions of what is uploaded, by path.
+        stamps: Receives the sizes and versions of the uploaded files, by path.
 
     Raises:
         InputError: The folder for temporary files cannot be written, or the store.

@@ -52,7 +52,7 @@ class StoredObject:
 
     Attributes:
         url: Its URL, which may hold a signature.
-        size: Bytes; None where the store does not list them.
+        size: Bytes; None if the store does not list them.
         version: Changes when its content does.
     """
 
@@ -156,7 +156,7 @@ def tried(url: str, request: Callable[[], Result]) -> Result:
     for wait in (*WAITS, None):
         try:
             return request()
-        except Exception as error:  # of whatever library the store's file system is made of
+        except Exception as error:  # each library of a store raises its own kinds
             if wait is None or _is_final(url, error):
                 # From None: what the library's error holds may be secret.
                 raise _refusal(url, error) from None
@@ -195,7 +195,7 @@ def _opened(url: str) -> tuple[Any, str]:
 
 
 def _found(url: str) -> list[StoredObject]:
-    """The object at a URL, or those below it; none where nothing is there."""
+    """The object at a URL, or those below it; an empty list if there is nothing."""
     filesystem, path = _opened(url)
     entries = tried(url, lambda: _entries(filesystem, url, path))
     return [_object(filesystem, entry) for entry in entries]

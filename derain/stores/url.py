@@ -24,7 +24,7 @@ def is_web(place: Place) -> bool:
 
 
 def place_of(text: str) -> Place:
-    """The place that a user names: a URL as it is, anything else as a path."""
+    """The place that a user names: a URL as text, anything else as a path."""
     return text if is_url(text) else Path(text)
 
 
@@ -68,5 +68,5 @@ def path_of(url: str) -> Path:
 
 
 def url_of(path: Path) -> str:
-    """The URL that :func:`path_of` made a path of; any other path as it is."""
+    """The URL of a path from :func:`path_of`; the text of any other path."""
     return re.sub(rf"^({SCHEME}):/(?!/)", r"\1://", str(path))

@@ -20,8 +20,8 @@ LARGEST_NEGATIVE_SHARE = 0.1
 
 # Whether a file is float64 or float32 follows from its numbers: read as the other type, many are
 # beyond any sensor's reach, or nearer to 0 than anyone measures. HEAD: bytes of the file that are
-# looked at. FEWEST_ROWS: with fewer, nothing follows. SMALLEST_VALUE: what is nearer to 0 is not
-# measured. LARGEST_ODD_SHARE: a larger share of rows with such numbers is no chance.
+# examined. FEWEST_ROWS: fewer rows prove nothing. SMALLEST_VALUE: no sensor measures values nearer
+# to 0. LARGEST_ODD_SHARE: a larger share of rows with such numbers is no chance.
 HEAD = 2**16
 FEWEST_ROWS = 8
 SMALLEST_VALUE = 1e-12
@@ -80,7 +80,7 @@ class Binary(Format):
             columns: Names of the values of a row.
 
         Returns:
-            The number; None where the file is not whole rows.
+            The number; None if the file is not whole rows.
 
         Raises:
             InputError: A file that cannot be read.

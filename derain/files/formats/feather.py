@@ -79,7 +79,7 @@ class Feather(Format):
         require(content.path, FLATBUFFERS)
         if not content.data.startswith(_MAGIC):
             raise ValueError("it does not begin as Feather version 2 does")
-        # As a stream, so that what is read are the messages that were checked.
+        # Read as a stream, so that PyArrow reads exactly the checked messages.
         stream = content.data[len(_MAGIC) :]
         compression = _check_messages(arrow, stream, content.budget)
         with arrow.ipc.open_stream(stream) as messages:
@@ -125,9 +125,9 @@ class Feather(Format):
 
 
 def _check_messages(arrow: ModuleType, stream: bytes, budget: MemoryBudget) -> str:
-    """Takes room for what compressed messages of a stream expand to.
+    """Reserves memory for the expanded messages of a compressed stream.
 
-    PyArrow allocates whatever they state.
+    PyArrow allocates any size that they state.
 
     Args:
         arrow: PyArrow.
@@ -153,14 +153,14 @@ def _check_messages(arrow: ModuleType, stream: bytes, budget: MemoryBudget) -> s
             batch = _member(batch, _DICTIONARY_DATA)
         codec = None if batch is None else _member(batch, _BATCH_COMPRESSION)
         if batch is not None and codec is not None:
-            _take(batch, memoryview(message.body), budget)
+            _reserve_expanded(batch, memoryview(message.body), budget)
             compression = _CODECS[
                 codec.GetSlot(_slot(_COMPRESSION_CODEC), 0, number_types.Int8Flags)
             ]
     return compression
 
 
-def _take(batch: Any, body: memoryview, budget: MemoryBudget) -> None:
+def _reserve_expanded(batch: Any, body: memoryview, budget: MemoryBudget) -> None:
     """Takes room for the buffers of a compressed batch."""
     place = batch.Offset(_slot(_BATCH_BUFFERS))
     first, count = batch.Vector(place), batch.VectorLen(place)
@@ -172,7 +172,7 @@ def _take(batch: Any, body: memoryview, budget: MemoryBudget) -> None:
 
 
 def _member(table: Any, number: int) -> Any:
-    """A table that is a member of another; None where it is missing."""
+    """A table that is a member of another; None if it is missing."""
     place = table.Offset(_slot(number))
     return type(table)(table.Bytes, table.Indirect(table.Pos + place)) if place else None
 

@@ -112,7 +112,7 @@ class Pcd(Format):
         """
         columns = describable_columns(path, scan, VALUE_TYPES)
         for name, column in columns.items():
-            if column.ndim > 1:  # as (N, COUNT), for a PCD knows no further axes
+            if column.ndim > 1:  # as (N, COUNT), because a PCD has no further axes
                 columns[name] = column.reshape(len(column), math.prod(column.shape[1:]))
         dtypes = [
             np.dtype((column.dtype.newbyteorder("<"), column.shape[1:]))
@@ -223,8 +223,8 @@ def _decompressed_columns(
 def _check_points(header: PcdHeader, points: int, rest: int) -> None:
     """Refuses data that are less than the header states, or too much to be whole points.
 
-    A header may contradict itself (WIDTH · HEIGHT is not POINTS): one of the two numbers must be
-    that of the data. Data of more whole points than either are taken as they are.
+    A header may contradict itself (WIDTH · HEIGHT is not POINTS). One of the two numbers must then
+    match the data. If the data have more whole points than either, all of them are read.
     """
     stated = {header.points, header.width * header.height}
     if points not in stated and (points < max(stated) or rest):

@@ -103,7 +103,7 @@ class Faces:
     """Faces with the same number of vertices.
 
     Attributes:
-        element: Their name, number and properties, of which the first lists their vertices.
+        element: Their name, number and properties; the first property lists their vertices.
         table: A row for each face, structured (F,), as `Element.row` gives it.
         points: Number of vertices that they are numbered among.
     """

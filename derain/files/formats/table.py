@@ -170,7 +170,7 @@ def _refuse_unreadable(path: Path, name: str, column: NDArray[Any], separator: s
 
 
 def _parse_table(text: bytes) -> TableHeader:
-    """Reads lines of numbers; empty lines are passed over.
+    """Reads lines of numbers; empty lines are skipped.
 
     The first line names the columns if any of its values is no number; otherwise they are called by
     their places.

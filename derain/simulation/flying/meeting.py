@@ -95,7 +95,7 @@ class Population:
 def covered_share(beam: Floats, particle: Floats, offset: Floats) -> Floats:
     """Share of a beam's cross-section that a particle covers, float64 (M,), in 0..1.
 
-    The area of the lens in which two discs overlap, over that of the first.
+    The area of the lens in which two discs overlap, divided by the area of the first disc.
 
     Args:
         beam: Width of the beam where the particle is, float64 (M,), metres.
@@ -208,7 +208,7 @@ def _jittered(
     measured = distance + spread * generator.normal(size=len(distance))
     # Between the sensor's limits, and not behind the surface that ends the beam.
     measured = np.maximum(np.minimum(measured, reach[particles.beam]), sensor.minimum_range)
-    # The power is that of the true distance.
+    # The power depends on the true distance.
     reflectivity = np.minimum(particles.reflectivity * (measured / distance) ** 2, 1)
     return replace(particles, range=measured, reflectivity=reflectivity)
 
@@ -219,9 +219,9 @@ def draw_haze(
     """Draws what a haze returns: of a share of the beams, exponentially distributed in distance.
 
     The distance to the first of many weak scatterers in an even medium is exponential. Where there
-    are patches, the share of a beam follows a smooth random field over the view, whose mean is the
-    stated share. The power of a return over the threshold is log-uniform. All of it
-    is a modelling choice; what would lie behind the surface that ends the beam is left out.
+    are patches, the share of a beam follows a smooth random field over the view with the stated
+    share as its mean. The power of a return over the threshold is log-uniform. All of it is a
+    modelling choice. Scatterers behind the surface that ends the beam are left out.
 
     Args:
         clear: Return of each beam through clear air.

@@ -11,8 +11,8 @@ from derain.simulation.arrays import Floats
 from derain.simulation.flying.precipitation import SMALLEST, Precipitation
 from derain.simulation.sensor import Sensor
 
-# Diameters that a distribution is drawn from, evenly spaced on a logarithmic scale: from .2 mm to
-# 20 mm they are 1 % apart. That there are none between them is a modelling choice.
+# Number of diameters that a distribution is drawn from, evenly spaced on a logarithmic scale: from
+# .2 mm to 20 mm they are 1 % apart. Drawing from steps is a modelling choice.
 CELLS = 480
 
 
@@ -92,8 +92,8 @@ class Optics:
         """The optics of a sensor in some precipitation.
 
         Where that states a reach, the gain is such that a particle of its mean diameter is at the
-        detection threshold there. A modelling choice: how strongly a particle returns over a
-        surface, and how a sensor weighs what is near, is not published for most of them.
+        detection threshold there. This is a modelling choice: for most sensors, neither the return
+        of a particle over a surface nor the weighting of near returns is published.
         """
         aperture = precipitation.spill * sensor.aperture
         spread = precipitation.spill * sensor.beam_spread

@@ -129,11 +129,11 @@ class OpenBeams:
 def draw_particles(
     number: float, sizes: Sizes, stretch: Stretch, beams: OpenBeams, generator: Generator
 ) -> tuple[Particles, Meetings]:
-    """Draws particles of an even density that beams meet where they may be.
+    """Draws particles of an even density on the stretches of the beams.
 
-    For each beam they are drawn as if it were alone; a particle within several beams so comes up
-    for each of them. It is kept only for the nearest of those whose stretches it is on. What is
-    kept is the Poisson process of the space that the beams fill together.
+    Particles are drawn for each beam as if it were alone, so a particle within several beams is
+    drawn for each of them. It is kept only for the nearest beam with a stretch at its place. The
+    kept particles are the Poisson process of the space that the beams fill together.
 
     Args:
         number: Particles per cubic metre.
@@ -190,7 +190,7 @@ def _drawn_beam_by_beam(
     if not beam:
         return Particles(np.empty((0, 3)), np.empty(0)), np.empty(0, np.int64)
     rows, along, size = np.concatenate(beam), np.concatenate(distance), np.concatenate(diameter)
-    # Uniform in the disc of the slice's far end, of which the beam has less where it is narrower.
+    # Uniform in the disc at the slice's far end; where the beam is narrower, it covers less of it.
     offset = np.sqrt(generator.random(len(rows))) * (np.concatenate(bound) + size) / 2
     turn = generator.uniform(0, 2 * np.pi, len(rows))
     inside = (offset < (optics.width(along) + size) / 2) & stretch.holds(rows, along)

@@ -15,8 +15,8 @@ from derain.simulation.settings import Positive, Settings, Share
 # How the density of particles varies in space, see :class:`derain.simulation.flying.regions.Gusts`.
 GustForm = Literal["even", "gusts", "sheets", "filaments"]
 
-# Diameters that are drawn at all, millimetres. What is smaller returns too little to be seen one by
-# one; the largest aggregates of snow on record are rare exceptions.
+# Range of diameters that are drawn, millimetres. Smaller particles return too little to be seen
+# singly; the largest aggregates of snow on record are rare exceptions.
 # Source: Lawson, Stewart and Angus 1998, "Observations and numerical simulations of the origin and
 # development of very large snowflakes", for aggregates of several centimetres.
 SMALLEST, LARGEST = 0.2, 40.0
@@ -51,7 +51,7 @@ class Precipitation(Settings):
         gust_seed: Directions of its waves.
         drift: Particles that drift at the ground over those that fall.
         drift_height: Height over which their density falls to 1/e, metres.
-        plumes: How many cars raise spray, where so many are seen.
+        plumes: Number of cars that raise spray; fewer if fewer are seen.
         plume_number: Drops per cubic metre of spray where it is densest, m⁻³.
         plume_length: Length of a plume, metres.
         haze: Share of the beams in which the air or water on the sensor returns something.

@@ -13,7 +13,7 @@ from derain.simulation.flying.particles import Stretch
 from derain.simulation.flying.precipitation import GustForm
 from derain.simulation.sensor import Returns
 
-# Plane waves of a random field; from so many on it is as good as Gaussian.
+# Number of plane waves of a random field: enough to make it practically Gaussian.
 GUST_WAVES = 12
 
 # Share of the densest that is left between sheets and filaments, a modelling choice.
@@ -194,7 +194,7 @@ def draw_plumes(
         clear: Return of each beam through clear air.
         beams: Unit vectors along them, float64 (N, 3), sensor frame.
         ground: Height of the ground in the sensor frame, metres.
-        count: How many; fewer only where no car is seen.
+        count: Number of plumes; fewer only where no car is seen.
         length: Metres.
         generator: Random generator.
     """

@@ -1,8 +1,8 @@
 """The carrier that a sensor sees under itself: a car, a lorry, a robot, a tripod, a mast.
 
-Its parts are seen from .15 to 3 m, most of them at grazing angles or of paint that mirrors the
-light away, so that much of a carrier returns in a few scattered points, or not at all, and hides
-what is behind it all the same.
+Its parts are seen from .15 to 3 m, most of them at grazing angles or with paint that mirrors the
+light away. Much of a carrier therefore returns a few scattered points, or none, but still hides the
+things behind it.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -17,11 +17,11 @@ from derain.simulation.drawing import Span, log_uniform, pick
 from derain.simulation.objects import PAINT, Surface, mirrored
 from derain.simulation.shapes import Point, Triangles, bars
 
-# Of how many specks a part is seen that returns nothing else.
+# Number of specks of a part that returns nothing else.
 SPECKS_OF_A_CARRIER = (1.0, 100.0)
 
-# Share of the parts of a carrier that are painted so that they return all over: of half of the
-# carriers none.
+# Share of the parts of a carrier with paint that returns everywhere; half of the carriers have
+# none.
 PAINTED = (0.0, 0.0, 0.25, 0.6)
 
 # A sensor is mounted on a car from so high on, and on a lorry, metres.
@@ -182,7 +182,7 @@ def _equipment(distance: Span, floor: float, generator: Generator) -> Parts:
 
     Args:
         distance: Nearest and farthest, metres.
-        floor: What they stand on, metres, in the sensor's frame.
+        floor: Height of the ground that they stand on, metres, in the sensor's frame.
         generator: Random generator.
     """
     for _ in range(generator.poisson(2.5)):

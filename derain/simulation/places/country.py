@@ -13,7 +13,7 @@ from derain.simulation.objects import Surface
 from derain.simulation.places import ground, openwork, placing, plants
 from derain.simulation.track import Track
 
-# How far what is beside the road goes on behind the sensor and ahead of it, metres.
+# Extent of the roadside behind the sensor and ahead of it, metres.
 COUNTRY_SIGHT = (-45.0, 75.0)
 
 
@@ -32,7 +32,7 @@ class Road:
     half_width: float
 
     def beside(self, side: int, outwards: float) -> placing.Line:
-        """The line so many metres outwards from its left (1) or right edge."""
+        """The line at a distance outwards from its left (1) or right edge, metres."""
         return lambda x: self.aside + self.bend * x**2 + side * (self.half_width + outwards)
 
     def beside_it(self, x: float, y: float) -> bool:

@@ -13,7 +13,7 @@ from derain.simulation.places import ground, openwork, placing, plants, road_use
 from derain.simulation.places.walls import Walls
 from derain.simulation.track import Track
 
-# What is above the sensor is higher than this, metres: sensors on a car's roof fit in.
+# Least height of the ceiling, metres: sensors on a car's roof fit in.
 LOWEST_CEILING = 2.9
 
 

@@ -16,7 +16,7 @@ from derain.simulation.objects import Surface, spotted
 RELIEF_WAVES = 12
 WAVELENGTHS = (2.5, 60.0)
 
-# The mesh of the ground: rings of corners, each so many, from the first radius to the last, metres.
+# The mesh of the ground: corners per ring, rings, and their first and last radius, metres.
 CORNERS = 400
 RINGS = 100
 RADII = (0.6, 130.0)
@@ -96,7 +96,7 @@ CONCRETE = GroundKind(TrackClass.ROAD, (0.001, 0.006), (0.1, 0.4), wet=0.1)
 def ground_mesh(
     kinds: Sequence[GroundKind], kind_at: Callable[[Floats, Floats], Ints], generator: Generator
 ) -> Iterator[Surface]:
-    """The ground about the sensor, finest near it, on a plane but for its bumps.
+    """The ground about the sensor: a plane with bumps, its mesh finest near the sensor.
 
     Args:
         kinds: Its materials.

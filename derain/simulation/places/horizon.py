@@ -29,7 +29,7 @@ RETROREFLECTIVE = (0.7, 1.0)
 
 
 def lay_out_horizon(generator: Generator) -> Iterator[Surface]:
-    """Lays out what is far away, to be added to any place outdoors.
+    """Lays out distant things, for any place outdoors.
 
     Args:
         generator: Random generator.
@@ -188,7 +188,7 @@ def _glint(away: float, generator: Generator) -> Iterator[Surface]:
 
 
 def _vehicle(away: float, generator: Generator) -> Iterator[Surface]:
-    """A car or a lorry, of which some beams meet the lamps or the edges of the roof."""
+    """A car or a lorry; some beams meet its lamps or the edges of its roof."""
     length, width, height = [(4.4, 1.8, 1.5), (10.0, 2.5, 3.6)][int(generator.random() < 0.3)]
     body = shapes.box(length, width, -1.0, height, heading=generator.uniform(-np.pi, np.pi))
     yield of_material([body], (0.02, 0.6), generator, TrackClass.CAR)

@@ -27,7 +27,7 @@ Line = Callable[[Floats], Floats]
 # What stands in a place is farther from the sensor's axis, metres. Only the ground reaches it.
 CLEARANCE = 1.6
 
-# Half of the things are within so many degrees of straight ahead, where every sensor looks.
+# Half of the things are within this angle of straight ahead, degrees, where every sensor looks.
 AHEAD = 55.0
 
 PLACING_TRIES = 30
@@ -44,7 +44,7 @@ def free_places(
     """Places about the sensor, as many within each doubling of the distance.
 
     Args:
-        count: How many; fewer where there is no room for them.
+        count: Number of things; fewer if there is no room for them.
         distances: Nearest and farthest, metres.
         apart: Least distance between two of them, metres.
         generator: Random generator.
@@ -119,7 +119,7 @@ def choose(options: Options, count: int | Counts, generator: Generator) -> list[
 
     Args:
         options: The makers and their shares.
-        count: How many, or between which numbers it is drawn.
+        count: Number of things, or the limits between which it is drawn.
         generator: Random generator.
     """
     number = count if isinstance(count, int) else int(generator.integers(*count))
@@ -135,7 +135,7 @@ def assemble(
     generator: Generator,
     over: Iterable[Surface] = (),
 ) -> Track:
-    """A track of what is laid out on a plane: cleared about the sensor, on uneven ground, tilted.
+    """A track of things laid out on a plane: cleared about the sensor, on uneven ground, tilted.
 
     Args:
         ground: The ground.
@@ -184,7 +184,7 @@ def users(
         generator: Random generator.
         allowed: Function that allows places.
         walkers: Fewest people on foot, and one more than the most.
-        cars: The same of vehicles, of which few are lorries.
+        cars: The same for vehicles; a few of them are lorries.
     """
     kinds: Options = [(road_users.glazed_car, 8), (objects.car, 2), (road_users.lorry, 1)]
     wheeled = choose(kinds, cars, generator)

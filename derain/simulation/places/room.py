@@ -31,8 +31,8 @@ SPECKS_OF_A_THING = (3.0, 150.0)
 def lay_out_room(generator: Generator) -> Track:
     """Lays out a room in a building: mostly a furnished one, else a corridor or a staircase.
 
-    Its walls, floor and ceiling are closed about the sensor, but for windows, glass and doors, with
-    more walls behind. Tables, chairs, shelves, plants, machines, cables, lamps and people stand and
+    Walls, floor and ceiling enclose the sensor, except for windows, glass and doors, with more
+    walls behind. Tables, chairs, shelves, plants, machines, cables, lamps and people stand and
     hang from .4 m on.
     """
     kind = generator.choice(["furnished", "corridor", "stairs"], p=[0.7, 0.15, 0.15])
@@ -56,7 +56,7 @@ def lay_out_room(generator: Generator) -> Track:
 
 
 def _cleared(surface: Surface) -> Surface:
-    """A surface without what is too near to the sensor's axis."""
+    """A surface without its parts too near to the sensor's axis."""
     x, y = shapes.nearest_to_axis(surface.triangles)
     far = (np.hypot(x, y) > ROOM_CLEARANCE) & ~_about_axis(surface.triangles)
     reflectivity = np.broadcast_to(surface.reflectivity, len(far))[far]
@@ -64,7 +64,7 @@ def _cleared(surface: Surface) -> Surface:
 
 
 def _polished(surface: Surface, generator: Generator) -> Iterator[Surface]:
-    """A thing as it is, or of polished metal, black glass or lacquer, seen in a few specks."""
+    """The thing unchanged, or of polished metal, black glass or lacquer, seen in a few specks."""
     if generator.random() > POLISHED or surface.label != TrackClass.BACKGROUND:
         yield surface
         return

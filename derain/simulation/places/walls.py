@@ -42,7 +42,7 @@ def laid_flat(
 
     Args:
         wall: Its x and z become x and y.
-        corner: The x and y of what was at its origin, metres.
+        corner: The x and y at which the wall's origin is placed, metres.
         height: Of the floor or ceiling, metres.
         bumps: Factor of the bumps.
     """
@@ -159,7 +159,7 @@ class Walls:
 
 
 def shell(room: Walls, generator: Generator) -> Iterator[Surface]:
-    """Floor, ceiling and walls, closed but for windows and doorways."""
+    """Floor, ceiling and walls, closed except for windows and doorways."""
     length, width = room.x[1] - room.x[0], room.y[1] - room.y[0]
     for height, bumps in ((0.0, SMOOTH), (room.height, -SMOOTH)):
         rough = rough_wall(length + 2 * OVERLAP, width + 2 * OVERLAP, generator, cell=0.5)
