@@ -98,6 +98,17 @@ def test_neighbours_are_the_nearest_of_all_points() -> None:
     np.testing.assert_allclose(seen.distances, expected, atol=1e-5)
 
 
+def test_of_equally_near_neighbours_the_first_row_comes_first() -> None:
+    lattice = np.stack(np.meshgrid(*3 * [np.arange(8.0)]), axis=-1).reshape(-1, 3) * 3 + 5
+    xyz = np.random.default_rng(0).permutation(lattice).astype(np.float32)
+    seen = VIEW(Scan(xyz))
+    rows = seen.first[seen.neighbours]
+    squared = np.square(xyz[:, None].astype(np.float64) - xyz).sum(axis=2)
+    nearest = np.argsort(squared, axis=1, kind="stable")[:, : VIEW.neighbours]
+    np.testing.assert_array_equal(rows, nearest[rows[:, 0]])
+    assert len(rows) > 20
+
+
 def test_scores_go_to_isolated_points_and_0_to_all_others() -> None:
     scan = wall_and_drops()
     seen = VIEW(scan)
