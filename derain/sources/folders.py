@@ -364,12 +364,33 @@ def recordings_below(
     if takes_none or not os.path.isdir(folder) or _holds_scans(folder) or bags_at(folder):
         return []
     if (layout := find_layout(folder, layouts)) is not None:
-        _warn_of_other_folders(folder, scan_folders(folder, layout))
+        sequences = [os.path.realpath(scans.parent) for scans in scan_folders(folder, layout)]
+        _warn_of_other_recordings(folder, sequences, layouts, results)
         return []
     found = sorted({*_Search(folder, layouts, results).inside(folder)})
     if found:
         _warn_of_others(folder, found)
     return found
+
+
+def _warn_of_other_recordings(
+    folder: Path,
+    sequences: Sequence[str],
+    layouts: Sequence[Layout] | None,
+    results: Sequence[Path],
+) -> None:
+    """Warns of recordings beside sequences that lie directly in a folder."""
+    whole = os.path.realpath(folder)
+    if any(os.path.dirname(sequence) != whole for sequence in sequences):
+        return
+    known = [*results, *map(Path, sequences)]
+    if others := [*_Search(folder, layouts, known).inside(folder)]:
+        recordings = (
+            "1 other recording" if len(others) == 1 else f"{len(others):,} other recordings"
+        )
+        warn_once(
+            f"{folder}: {recordings} passed over, such as {others[0]}; name them to read them"
+        )
 
 
 class _Search:
@@ -398,14 +419,16 @@ class _Search:
 
     def _at(self, folder: Path) -> Iterator[Path]:
         """The recordings that a folder is, or that lie in it."""
-        if is_bag(folder) or _holds_scans(folder):
+        if is_bag(folder):
+            yield folder
+            return
+        if _holds_scans(folder):
             yield folder
         layout = find_layout(folder, self._layouts)
         scans = [] if layout is None else scan_folders(folder, layout)
         sequences = [each.parent for each in scans]
         yield from sequences
-        lies_in_others = all(sequence.parent == folder for sequence in sequences)
-        if lies_in_others and not is_bag(folder):  # no data set, and no sequence of one
+        if all(sequence.parent == folder for sequence in sequences):  # else it is a data set
             yield from bags_at(folder)
             yield from self.inside(folder)
 
@@ -481,23 +504,6 @@ def _warn_of_others(path: Path, taken: Sequence[Path]) -> None:
     if others:
         counts = ", ".join(f"{number:,} {kind}" for kind, number in sorted(others.items()))
         warn_once(f"{path}: {counts} passed over; name them to have them read")
-
-
-def _warn_of_other_folders(folder: Path, taken: Sequence[Path]) -> None:
-    """Warns of folders of scans beside sequences that lie directly in a folder."""
-    whole = Path(os.path.abspath(folder))
-    sequences = [Path(os.path.abspath(scans)).parent for scans in taken]
-    if any(sequence.parent != whole for sequence in sequences):
-        return
-    names = {sequence.name for sequence in sequences}
-    with reading(folder), os.scandir(folder) as entries:
-        others = [each.path for each in entries if each.is_dir() and each.name not in names]
-    number = sum(_holds_scans(Path(other)) for other in others)
-    if number:
-        folders = "folder" if number == 1 else "folders"
-        warn_once(
-            f"{folder}: {number:,} other {folders} of scans passed over; name them to read them"
-        )
 
 
 def _kind(entry: os.DirEntry[str]) -> str:

@@ -284,11 +284,14 @@ def test_what_was_named_by_itself_is_no_folder_of_recordings(
 ) -> None:
     touch(tmp_path / "set/velodyne/0.bin", tmp_path / "set/velodyne/1.bin")
     touch(tmp_path / "sets/a/velodyne/0.bin", tmp_path / "sets/other/0.bin")
+    touch(tmp_path / "sets/.hidden/0.bin", tmp_path / "sets/broken/drive.bag.active")
     monkeypatch.chdir(tmp_path / "set")
     assert [frame.key for frame in named_frames(".")] == ["0", "1"]
     assert capsys.readouterr().err == ""
     assert [frame.key for frame in named_frames(tmp_path / "sets")] == ["0"]
-    assert f"{tmp_path / 'sets'}: 1 other folder of scans" in capsys.readouterr().err
+    warned = capsys.readouterr().err
+    assert f"{tmp_path / 'sets'}: 1 other recording" in warned
+    assert "drive.bag.active" in warned
 
 
 def test_a_recording_that_cannot_be_read_is_passed_over_with_a_warning(
