@@ -17,7 +17,8 @@ from derain.datamodules.scan_data import Loading, Part, ScanData, split_source, 
 from derain.errors import InputError
 from derain.files.documents import Entry
 from derain.simulation.manifest import RAIN_RATE, manifest_of, rates_of_sequences, read_manifest
-from derain.sources.folders import find_layout, named_frames
+from derain.sources.folders import named_frames
+from derain.sources.search import find_layout
 from derain.sources.source import Source
 
 

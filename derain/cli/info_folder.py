@@ -19,8 +19,8 @@ from derain.evaluation.contents import (
 from derain.evaluation.text_tables import plain_table
 from derain.jobs.running import Submits, Task, values
 from derain.simulation.manifest import manifest_of
-from derain.sources.folders import find_layout
 from derain.sources.frame import Frame
+from derain.sources.search import find_layout
 from derain.sources.units import Division, FrameUnit, folder_of_paths, shared_options, units_of
 from derain.stores.url import Place
 

@@ -18,9 +18,10 @@ from derain.files.names import scan_stem
 from derain.files.reading import reading
 from derain.jobs.running import ValueWork
 from derain.simulation.manifest import RAIN_RATE, manifest_of
-from derain.sources.folders import frames_of, listed_scans, named_frames, scan_folders
+from derain.sources.folders import frames_of, named_frames
 from derain.sources.frame import Frame
 from derain.sources.recordings import recordings_of
+from derain.sources.search import listed_scans, scan_folders
 from derain.sources.source import Frames, Source
 from derain.sources.units import FrameUnit
 

@@ -16,7 +16,8 @@ from derain.files.labels import write_labels
 from derain.pictures.data_statistics import CLEAN, statistics_figure
 from derain.scan import Scan
 from derain.simulation.campaign import MAKER
-from derain.sources.folders import find_layout, frame_of
+from derain.sources.folders import frame_of
+from derain.sources.search import find_layout
 
 REHEARSE3D = Layout(scans="lidar_radar_pcd", labels="lidar_radar_labels", lidar="innoviz")
 OTHERS = Layout(scans="lidar", labels="classes")

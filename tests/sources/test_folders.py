@@ -14,15 +14,9 @@ from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
 from derain.scan import Scan
-from derain.sources.folders import (
-    find_layout,
-    named_frames,
-    relative_keys,
-    scan_folders,
-    sequence_frames,
-    source_of,
-)
+from derain.sources.folders import named_frames, relative_keys, sequence_frames, source_of
 from derain.sources.frame import MemoryFrame
+from derain.sources.search import find_layout, scan_folders
 
 REHEARSE3D = Layout(scans="lidar_radar_pcd", labels="lidar_radar_labels", lidar="innoviz")
 DRIVES = Layout(sequences="drives", scans="lidar", labels="truth")
