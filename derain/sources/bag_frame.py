@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass, replace
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 
@@ -113,8 +114,8 @@ def bag_frames(path: Path, labelled: bool = False, prefix: str = "") -> list[Bag
             f"there is no such cloud: {clouds.topic.name} has {len(clouds):,}",
             "Name another topic, or count from 000000.",
         )
-    keys = {each: f"{prefix}/{each:06d}" if prefix else f"{each:06d}" for each in numbers}
-    frames = (bag_frame(clouds, each, key) for each, key in keys.items())
+    keys = (Path(prefix, f"{each:06d}").as_posix() for each in numbers)
+    frames = map(partial(bag_frame, clouds), numbers, keys)
     return list(frames) if labelled else [frame.without_labels() for frame in frames]
 
 
