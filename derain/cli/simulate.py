@@ -72,7 +72,7 @@ if TYPE_CHECKING:
 
 # The names of derain.simulation.layouts, which takes too long to import where it is not used.
 LAYOUT_NAMES = (
-    *("facility", "street", "city", "country", "car_park", "motorway", "garage", "yard", "room"),
+    *("facility", "street", "city", "country", "motorway", "garage", "yard", "room"),
 )
 
 # Options of a data set, and what each is where it is not given.

@@ -5,13 +5,12 @@ from collections.abc import Callable
 from numpy.random import Generator
 
 from derain.simulation import facility
-from derain.simulation.places import car_park, city, country, garage, motorway, room, yard
+from derain.simulation.places import city, country, garage, motorway, room, yard
 from derain.simulation.track import Track
 
 # Each lays out another place of its kind for every state of the generator. The origin of the track
 # is on the ground under the sensor.
 LAYOUTS: dict[str, Callable[[Generator], Track]] = {
-    "car_park": car_park.lay_out_car_park,
     "city": city.lay_out_city,
     "country": country.lay_out_country,
     "facility": facility.lay_out_facility,
