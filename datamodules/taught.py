@@ -8,7 +8,7 @@ from derain.datamodules.base import Loading, Part, ScanDataModule
 from derain.datamodules.scan_data import taught_source
 from derain.sources.source import Frames, Source
 
-# Scans of a training epoch, at least: the learning rates are chosen for so many steps.
+# Scans of a training epoch, at least: the learning rates are chosen for this many steps.
 FEWEST_SHOWN = 16
 
 

@@ -17,10 +17,9 @@ from derain.errors import InputError, reason_of
 LARGEST_COORDINATE = 1e6
 LARGEST_VALUE = 1e7
 
-# Where all of at least so many points have one intensity, it was not measured but filled in. Of a
-# real scan as much as 80 % may share one value, such as 0: that a hundred points share it by chance
-# happens once in 10⁹ draws (.8¹⁰⁰), that ten do once in ten. From fewer than a hundred points of
-# one intensity nothing follows.
+# If at least this many points all have one intensity, it was filled in and not measured. In a real
+# scan up to 80 % of the points may share one value, such as 0: a hundred points share it by chance
+# once in 10⁹ draws (.8¹⁰⁰), ten points once in ten. Fewer points of one intensity prove nothing.
 FEWEST_ALIKE = 100
 
 # SemanticKITTI-style range images mark a cell without a return by -1 in every column.
@@ -31,8 +30,8 @@ Named = TypeVar("Named")
 # Ids of semantic classes have 16 bits. A label of 32 bits has its instance in the other 16.
 LARGEST_ID = 0xFFFF
 
-# No sensor gives so many columns: an array that is wider than this, and than it is long, holds its
-# points as columns.
+# No sensor gives this many columns: an array that is wider than this, and wider than long, holds
+# its points as columns.
 WIDEST_ARRAY = 64
 
 

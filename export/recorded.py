@@ -45,8 +45,8 @@ UNLIKE = ScanIssue(
     "twice; it is judged by itself",
 )
 
-# Of at most so many points that the model takes for solid, more rays of another scan have to end at
-# them than go through them. Where they do not, a pose is wrong.
+# Number of points, solid by the model, that a pose is checked at: more rays of another scan have to
+# end at them than go through them, or else a pose is wrong.
 CHECKED = 2000
 
 

@@ -14,7 +14,7 @@ from optuna.trial import FrozenTrial, TrialState
 # Attribute of a trial: how many trials had been drawn before it.
 BEFORE = "drawn_before"
 
-# Two searches that entered a trial at once would do so again: they wait up to so many seconds.
+# Two searches that entered a trial at once would do so again: they wait up to this many seconds.
 LONGEST_PAUSE = 0.1
 
 
@@ -73,7 +73,7 @@ class SharedTrials:
             most: Number of trials of all searches together.
 
         Returns:
-            The trial, with its parameters; None where so many are complete.
+            The trial, with its parameters; None where that many are complete.
         """
         while True:
             trials = self._trials()

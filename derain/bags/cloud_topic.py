@@ -21,7 +21,7 @@ from derain.bags.topics import Topic
 from derain.errors import InputError
 from derain.system.notices import warn
 
-# Up to so many clouds ahead, reading on is quicker than a search.
+# Up to this many clouds ahead, reading on is quicker than a search.
 NEAR = 8
 
 

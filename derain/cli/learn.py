@@ -33,7 +33,7 @@ from derain.system.extras import EXPORT_LIBRARIES, TRAINING_LIBRARIES, require
 from derain.workflows.learn_config import STUDENTS, LearnConfig
 from derain.workflows.start import START_HELP
 
-# The Rerun file shows so many scans of a long recording, spread over all of it.
+# The Rerun file shows this many scans of a long recording, spread over all of it.
 MOST_SHOWN = 100
 
 

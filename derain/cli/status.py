@@ -21,7 +21,7 @@ from derain.jobs.unit import Record
 from derain.sources.cleaned_scan import CleanedTotals
 from derain.stores.url import place_of
 
-# At most so many failed units are printed with their reasons.
+# At most this many failed units are printed with their reasons.
 MOST_FAILED = 20
 
 

@@ -20,7 +20,7 @@ from derain.system.notices import warn
 # The options that :func:`add_units` declares: how the work is divided changes no result.
 UNIT_OPTIONS = ("workers", "dask", "shard", "resume", "anew", "block")
 
-# A worker has at least so many units where there are several workers unasked: none waits for long.
+# Where the number of workers is not given, each has at least this many units: none waits for long.
 UNITS_OF_WORKER = 4
 
 # Bytes that a worker may take: scans of a million points take .8 GB.

@@ -127,5 +127,5 @@ def mean_distance(view: Neighbourhoods, neighbours: int) -> NDArray[np.float64]:
 
 
 def usual_limit(distance: NDArray[np.float64], deviations: float) -> float:
-    """Mean of two distances or more, plus so many of their standard deviations (of n - 1)."""
+    """Mean of two distances or more, plus a number of their standard deviations (of n - 1)."""
     return float(distance.mean() + deviations * distance.std(ddof=1))

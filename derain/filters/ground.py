@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from derain.views.morton import evenly
 
-# Within so many metres a road is flat, and beyond the first of them lies no longer the vehicle.
+# Distances between which the road is sought, metres: nearer lies the vehicle, farther off the road
+# may not be flat.
 NEAREST, FARTHEST = 1.5, 30.0
 
 # No road climbs more to either side, as the sensor sees it, than its own tilt and a ramp.
@@ -35,7 +36,7 @@ FEWEST_LOW_POINTS = 30
 # plane is a quarter of a metre off, and curbs, snow and bumpers are above this last one.
 SCALES = (0.5, 0.4, 0.3, 0.2, 0.2, 0.2, 0.2)
 
-# A road is a plane to so many metres: its camber, its curbs and the snow that lies on it are in it.
+# Points this near to the plane are of the road, metres: its camber, its curbs and snow on it count.
 IN_PLANE = 0.3
 
 # Nearer than this to the road, no sensor is mounted, metres.

@@ -42,7 +42,7 @@ class Task:
         return extra_channels(self.spec.channels)
 
     def make_view(self, threads: int = 0) -> View:
-        """The view that the network sees a scan through, on so many threads; 0 takes all cores."""
+        """The view that the network sees a scan through; 0 threads are those of all cores."""
         return self.spec.make_view(threads)
 
 

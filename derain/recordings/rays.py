@@ -21,7 +21,7 @@ with sleeping_threads():
 # No sensor measures nearer than this, metres; it keeps every division finite.
 NEAREST = 0.01
 
-# Of so many rays, evenly spread over a scan, the step between them is the median.
+# The step between the rays of a scan is the median over this many of them, evenly spread.
 MOST_RAYS = 5000
 
 # To its third nearest neighbour a ray has a step or two, whichever of the two axes steps finer; the

@@ -20,7 +20,7 @@ WINDOW_STEPS = sorted(
     key=lambda step: (step[0] ** 2 + step[1] ** 2, step),
 )
 
-# The published vote: so many pixels vote, those farther off than the cutoff (weighted metres)
+# The published vote: this many pixels vote, those farther off than the cutoff (weighted metres)
 # abstain, and a difference in range weighs less the nearer the pixel is, by a Gaussian of so many
 # pixels. Source: as above.
 VOTERS = 5

@@ -23,7 +23,7 @@ WORTH = 0.05
 # The tail of the rain is read from the ten outermost points: of fewer it has none.
 FEWEST = 10
 
-# Bounds are rounded outwards to so many digits, so that they can be read.
+# Bounds are rounded outwards to this many digits, so that they can be read.
 DIGITS = 3
 
 
@@ -143,7 +143,7 @@ def _bounds(limits: Mapping[_Side, float]) -> tuple[Bound, ...]:
 
 
 def _rounded_up(number: float) -> float:
-    """The next number of so many digits that is not less."""
+    """The least number of that many digits that is not less."""
     if not number:
         return 0.0
     digits = DIGITS - 1 - math.floor(math.log10(abs(number)))

@@ -65,7 +65,7 @@ ONE_SURFACE = 1.25
 MORE_CROWDED = 1.25
 
 # Where that is looked for: within this of the x and y axes and of the diagonals between them, as a
-# tangent. It is a twentieth of the circle, and has to hold so many points.
+# tangent. It is a twentieth of the circle, and has to hold this many points.
 BESIDE_AXIS = 0.02
 FEWEST_IN_CELLS = 200
 

@@ -14,14 +14,14 @@ from derain.scan import Scan
 # middle, the next ones follow towards y (left).
 RAY_SECTORS = 12
 
-# Bins of range: so many metres each, and one more for whatever is beyond them, 300 m and more,
+# Width of a bin of range, metres, and the number of bins. The last is for everything from 300 m on,
 # which few sensors reach.
 BIN = 0.5
 RANGE_BINS = 601
 
-# Returns are of one ray whose directions lie in one cell, of so many in a quarter of a turn and so
-# many from the horizon upwards: .003 to .006 degrees wide. Two rays that are neighbours are farther
-# apart: 0.1 degrees and more. Coordinates are rounded to float32, which is far finer, or to
+# Returns whose directions lie in one cell are of one ray. There are this many cells in a quarter of
+# a turn, and as many from the horizon upwards: .003 to .006 degrees wide. Neighbouring rays are
+# farther apart: 0.1 degrees and more. Coordinates are rounded to float32, which is far finer, or to
 # millimetres, which near by is coarser: such returns count as rays of their own.
 CELLS_IN_QUARTER = 18_000
 CELLS_UPWARDS = 11_460
@@ -41,7 +41,7 @@ SCORES_IN_SECTOR = 2048
 # Steele and Vigna 2021, "Computationally easy, spectrally good multipliers".
 MULTIPLIER, NEXT_MULTIPLIER = 2654435769, 0x915F77F5
 
-# A sample has one in so many values, and speaks for all of them if it has so many numbers.
+# A sample takes one value in ONE_IN, and represents all of them if it has FEWEST_SAMPLED or more.
 ONE_IN, FEWEST_SAMPLED = 16, 3000
 
 

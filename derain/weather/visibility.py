@@ -23,7 +23,7 @@ FEWEST_RAYS = 100
 # of the normal distribution.
 ONE_IN_TWENTY = 1.645
 
-# An interval is printed where its far end is more than so many times its near one.
+# An interval is printed where its far end is more than this many times its near one.
 WIDE = 1.5
 
 # What is farther is as good as clear air, metres: of a hundred thousand rays, a hundred meet rain.

@@ -39,8 +39,8 @@ PUBLISHED_KEYS = {
     },
 }
 
-# Points whose neighbourhoods are gathered at a time. What is gathered of all points is nine times
-# their features, 140 MB of a scan of WADS, and so many points' stay in a processor's cache.
+# Points whose neighbourhoods are gathered at a time. Those of all points of a WADS scan have nine
+# times their features, 140 MB; those of this many stay in a processor's cache.
 POINT_BLOCK = 2048
 
 # The second convolution gathers k times the features of all points. In blocks, what is gathered

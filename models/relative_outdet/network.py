@@ -25,7 +25,7 @@ from derain.models.carrier import without_carrier
 # own beam may be nearer still.
 STEP_NEIGHBOUR = 3
 
-# The step of a scan is the median over so many of its points, evenly spread over its rows. With
+# The step of a scan is the median over this many of its points, evenly spread over its rows. With
 # 2,049, the answers changed with the order of the rows: one scan of snow, turned by half a degree,
 # went from an IoU of .54 to .67.
 SAMPLED_POINTS = 32769
