@@ -71,9 +71,7 @@ if TYPE_CHECKING:
     from derain.simulation.world import WorldCampaign
 
 # The names of derain.simulation.layouts, which takes too long to import where it is not used.
-LAYOUT_NAMES = (
-    *("facility", "street", "city", "country", "motorway", "garage", "yard", "room"),
-)
+LAYOUT_NAMES = ("facility", "street", "city", "country", "motorway", "garage", "yard", "room")
 
 # Options of a data set, and what each is where it is not given.
 DATA_SET_DEFAULTS: dict[str, Any] = {

@@ -94,7 +94,7 @@ def speed_error_figure(standings: Sequence[Standing], title: str) -> Figure:
     axes.set_xlabel("milliseconds a scan, from file to mask (median)")
     axes.set_ylabel("error: 1 - IoU of rain")
     front = np.transpose([standing.place for standing in pareto_front(standings)])
-    axes.plot(*front, color="#9ca3af", linewidth=1.2, zorder=1, label="nothing beats these")
+    axes.plot(*front, color="#9ca3af", linewidth=1.2, zorder=1, label="Pareto front")
     for group, (colour, marker) in LOOKS.items():
         if places := [standing.place for standing in standings if standing.group == group]:
             x, y = np.transpose(places)
