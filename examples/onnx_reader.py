@@ -31,7 +31,7 @@ VOTERS, CUTOFF = 5, 1.0
 
 # Of the isolated view: the same constants as the contract's.
 SAMPLED, STEP_NEIGHBOURS, FINEST_STEP, USUAL_STEP, NEAREST_POINT = 8192, 3, 1e-4, 0.1, 0.05
-AROUND, HALF_AT, MOST_CROWDED = 8, 2.0, 5.0
+AROUND, HALF_AT, MOST_CROWDED = 8, 2.0, 6.5
 RANGE_RESOLUTION, SAME_RAY = 0.05, 4e-4
 RANKS = 32
 SHELL_EDGES = np.square(np.geomspace(1, 60, 12)[1:-1]).astype(np.float32)
@@ -307,17 +307,22 @@ def merged(
 
 
 def crowding(xyz: Points, step: float) -> NDArray[np.float32]:
-    """Number of points near each one along the curve, nearer ones weighted more, float32 (M,)."""
+    """How crowded each point and the least crowded one near it are, float32 (M,)."""
     x, y, z = xyz.T
     squared = np.maximum(x * x + y * y + z * z, np.float32(NEAREST_POINT**2))
     per_half = 1 / (squared * np.float32((HALF_AT * step) ** 2))
-    result = np.zeros(len(xyz), np.float32)
-    for apart in range(1, min(AROUND, len(xyz) - 1) + 1):
+    near = np.zeros(len(xyz), np.float32)
+    reach = range(1, min(AROUND, len(xyz) - 1) + 1)
+    for apart in reach:
         x, y, z = (xyz[apart:] - xyz[:-apart]).T
         distance = x * x + y * y + z * z
-        result[:-apart] += 1 / (1 + distance * per_half[:-apart])
-        result[apart:] += 1 / (1 + distance * per_half[apart:])
-    return result
+        near[:-apart] += 1 / (1 + distance * per_half[:-apart])
+        near[apart:] += 1 / (1 + distance * per_half[apart:])
+    least = near.copy()
+    for apart in reach:
+        least[:-apart] = np.minimum(least[:-apart], near[apart:])
+        least[apart:] = np.minimum(least[apart:], near[:-apart])
+    return near + least
 
 
 def intensity_ranks(points: Points) -> NDArray[np.int64]:

@@ -23,16 +23,16 @@ from derain.views.neighbours import MOST_NETWORK_NEIGHBOURS, of_points_to_rows
 from derain.views.spherical_grid import ALL_AROUND
 from derain.views.view import VIEWS, BackProjection, View, ViewedScan
 
-# A point is isolated if no more than this crowds it, see :func:`crowding`. A
-# third of a scan is, and 99 % of simulated rain and snow; what is left out has others all around.
+# A point is isolated if no more than this crowds it, see :func:`crowding`. A quarter of a scan is,
+# and 97.5 % of the rain and snow in simulated worlds.
 # Source: modelling choice, on simulated worlds.
-MOST_CROWDED = 5.0
+MOST_CROWDED = 6.5
 
-# The step of a scan is the median over so many of its points, evenly along their curve.
+# The step of a scan is the median over this many of its points, evenly along their curve.
 SAMPLED = 8192
 
-# A step is the angle within which a point's nearest neighbours lie, so many of them: two on either
-# side along the axis of finer resolution, and one across it.
+# A step is the angle within which this many of a point's neighbours lie, the nearest ones: two on
+# either side along the axis of finer resolution, and one across it.
 STEP_NEIGHBOURS = 3
 
 # The least step, radians, and the step of a scan of too few points.
@@ -279,9 +279,12 @@ def _directions(xyz: NDArray[np.float32]) -> NDArray[np.float64]:
 
 
 def crowding(xyz: NDArray[np.float32], step: float) -> NDArray[np.float32]:
-    """Number of others near each point, weighted less the farther they are.
+    """How crowded each point is, together with the least crowded point near it.
 
-    Only what lies near it along the curve is looked at, so that nothing is searched for: a crowded
+    A point is as crowded as there are others near it, weighted less the farther they are. Rain is
+    among rain, so one of its neighbours is alone even where drops are dense; on a surface none is.
+
+    Only what lies near a point along the curve counts, so that nothing is searched for: a crowded
     point is crowded for sure, and one that seems to be alone may not be.
 
     Args:
@@ -289,17 +292,21 @@ def crowding(xyz: NDArray[np.float32], step: float) -> NDArray[np.float32]:
         step: Angle between neighbouring beams, radians.
 
     Returns:
-        From 0 to twice WINDOW, float32 (M,).
+        From 0 to four times WINDOW, float32 (M,).
     """
     x, y, z = np.ascontiguousarray(xyz.T)
     squared = np.maximum(x * x + y * y + z * z, np.float32(NEAREST_POINT**2))
     per_half = 1 / (squared * np.float32((HALF_AT * step) ** 2))
-    result = np.zeros(len(xyz), np.float32)
-    for apart in range(1, min(WINDOW, len(xyz) - 1) + 1):
-        before, after = slice(None, -apart), slice(apart, None)
+    near = np.zeros(len(xyz), np.float32)
+    pairs = [(slice(None, -n), slice(n, None)) for n in range(1, min(WINDOW, len(xyz) - 1) + 1)]
+    for before, after in pairs:
         distance = np.square(x[after] - x[before])
         distance += np.square(y[after] - y[before])
         distance += np.square(z[after] - z[before])
         for side in (before, after):
-            result[side] += 1 / (1 + distance * per_half[side])
-    return result
+            near[side] += 1 / (1 + distance * per_half[side])
+    least = near.copy()
+    for before, after in pairs:
+        np.minimum(least[before], near[after], out=least[before])
+        np.minimum(least[after], near[before], out=least[after])
+    return near + least

@@ -32,7 +32,7 @@ constexpr std::size_t kWindow = 8;
 constexpr double kHalfAt = 2.0;
 
 // What crowds a point that is isolated at most.
-constexpr float kMostCrowded = 5.0F;
+constexpr float kMostCrowded = 6.5F;
 
 // M points, of which S are isolated and are scored; the others are no rain.
 struct IsolatedPoints {
@@ -120,7 +120,8 @@ inline double beam_step(const std::vector<Position>& positions,
   return std::max(std::sqrt(median_of(std::move(widest))), kFinestStep);
 }
 
-// How many others are near each point along the curve, each counting the less the farther it is.
+// How crowded each point and the least crowded one near it along the curve are: others count the less the farther they
+// are.
 inline std::vector<float> crowding(const std::vector<float>& points, double step) {
   const std::size_t count = points.size() / 3;
   const auto half_at = static_cast<float>((kHalfAt * step) * (kHalfAt * step));
@@ -130,7 +131,7 @@ inline std::vector<float> crowding(const std::vector<float>& points, double step
     const float* p = &points[3 * point];
     per_half[point] = 1 / (std::max(p[0] * p[0] + p[1] * p[1] + p[2] * p[2], nearest) * half_at);
   }
-  std::vector<float> result(count, 0.0F);
+  std::vector<float> near(count, 0.0F);
   for (std::size_t apart = 1; apart <= kWindow && apart < count; ++apart) {
     std::vector<float> squared(count - apart);
     for (std::size_t point = 0; point + apart < count; ++point) {
@@ -140,11 +141,17 @@ inline std::vector<float> crowding(const std::vector<float>& points, double step
       const float y = q[1] - p[1];
       const float z = q[2] - p[2];
       squared[point] = x * x + y * y + z * z;
-      result[point] += 1 / (1 + squared[point] * per_half[point]);
+      near[point] += 1 / (1 + squared[point] * per_half[point]);
     }
     for (std::size_t point = apart; point < count; ++point) {
-      result[point] += 1 / (1 + squared[point - apart] * per_half[point]);
+      near[point] += 1 / (1 + squared[point - apart] * per_half[point]);
     }
+  }
+  std::vector<float> result(count);
+  for (std::size_t point = 0; point < count; ++point) {
+    const std::size_t first = point < kWindow ? 0 : point - kWindow;
+    const std::size_t last = std::min(point + kWindow + 1, count);
+    result[point] = near[point] + *std::min_element(near.begin() + first, near.begin() + last);
   }
   return result;
 }

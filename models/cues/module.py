@@ -70,7 +70,7 @@ class CueFusion(SupervisedModule):
         of_neighbour: int = 8,
         opinion: int = 12,
         context: int = 16,
-        fusion: int = 48,
+        fusion: int = 64,
         without_intensity: float = 0.0,
         learning_rate: float = 5e-3,
         weight_decay: float = 1e-4,

@@ -37,7 +37,7 @@ SHARE_ADDED = 0.5
 ROUNDS = 2
 
 # Numbers of a point that a fusion weighs besides the features of geometry.
-CUE_NUMBERS = 19
+CUE_NUMBERS = 22
 
 # Points that every shell is taken to hold besides its own, as bright as all of it: where few points
 # are, or little rain, brightness means little.
@@ -82,7 +82,7 @@ class CueNetwork(nn.Module):
         of_neighbour: int = 8,
         opinion: int = 12,
         context: int = 16,
-        fusion: int = 48,
+        fusion: int = 64,
         without_intensity: float = 0.0,
     ) -> None:
         super().__init__()
@@ -197,11 +197,13 @@ class Cues:
         around = slice(1, APART[-1] + 1)
         self._others = taken_of_each(others[around], doubtful)
         self._cell_of_others = taken(cell, taken_of_each(neighbours[around], doubtful))
+        self._rank = self._cell % INTENSITY_RANKS
+        self._rank_of_others = self._cell_of_others % INTENSITY_RANKS
         # Shifted and scaled, here and below, so that all numbers are of the order of 1.
         far = taken(far, doubtful)
         range_ = (USUAL_RANGE * far.exp()).clamp_min(NEAREST_POINT)
         apart = taken_of_each(distances[APART, :], doubtful) / range_
-        rank = (self._cell % INTENSITY_RANKS).to(far.dtype) / (INTENSITY_RANKS - 1)
+        rank = self._rank.to(far.dtype) / (INTENSITY_RANKS - 1)
         self._places = torch.cat(
             [(far + 0.3)[None], torch.log(apart + NEAREST_APART) + 4, rank[None]]
         )
@@ -239,6 +241,9 @@ class Cues:
                 taken(second.separation, shell),
                 taken(second.share, shell),
                 (of_scan / 4).expand_as(own),
+                taken(second.at_any_range, self._rank) / 2,
+                taken(second.at_any_range, self._rank_of_others).mean(dim=0) / 2,
+                second.separation_at_any_range.expand_as(own),
                 *self._places,
             ]
         )
@@ -255,12 +260,17 @@ class Brightness:
         separation: How well intensity tells rain from the rest in each shell: the mean of the
             log-odds over its rain, float (SHELLS,).
         share: Share of rain in each shell, float (SHELLS,).
+        at_any_range: Log-odds of rain by rank of intensity alone, over all shells, for shells that
+            hold few drops; float (INTENSITY_RANKS,).
+        separation_at_any_range: The mean of these over all rain, float ().
     """
 
     log_odds: Tensor
     rain: Tensor
     separation: Tensor
     share: Tensor
+    at_any_range: Tensor
+    separation_at_any_range: Tensor
 
 
 def calibrated(counts: Tensor, cell: Tensor, probability: Tensor) -> Brightness:
@@ -279,19 +289,37 @@ def calibrated(counts: Tensor, cell: Tensor, probability: Tensor) -> Brightness:
     rain = counts.new_zeros(counts.numel(), dtype=torch.float64)
     rain = _smoothed(rain.scatter_add(0, cell, probability.double()).reshape(counts.shape))
     rest = (_smoothed(counts.double()) - rain).clamp_min(0)
-    rain_in_shell, rest_in_shell = rain.sum(1, keepdim=True), rest.sum(1, keepdim=True)
-    in_shell = rain_in_shell + rest_in_shell
-    usual = (rain + rest + LEAST_COUNT) / (in_shell + LEAST_COUNT * INTENSITY_RANKS)
-    of_rain = (rain + PSEUDO_POINTS * usual) / (rain_in_shell + PSEUDO_POINTS)
-    of_rest = (rest + PSEUDO_POINTS * usual) / (rest_in_shell + PSEUDO_POINTS)
-    log_odds = (of_rain.log() - of_rest.log()).clamp(-LARGEST_LOG_ODDS, LARGEST_LOG_ODDS)
+    log_odds, separation = _log_odds(rain, rest)
+    at_any_range, separation_at_any_range = _log_odds(rain.sum(0)[None], rest.sum(0)[None])
+    rain_in_shell = rain.sum(1)
     results = (
         log_odds.flatten(),
-        rain_in_shell[:, 0],
-        (of_rain * log_odds).sum(1),
-        (rain_in_shell / (in_shell + 1))[:, 0],
+        rain_in_shell,
+        separation,
+        rain_in_shell / (rain_in_shell + rest.sum(1) + 1),
+        at_any_range[0],
+        separation_at_any_range[0],
     )
     return Brightness(*(result.to(probability.dtype) for result in results))
+
+
+def _log_odds(rain: Tensor, rest: Tensor) -> tuple[Tensor, Tensor]:
+    """Log-odds of rain by rank of intensity, and their mean over the rain, of each shell.
+
+    Args:
+        rain: Points of rain by shell and rank, float (shells, INTENSITY_RANKS).
+        rest: All other points, as ``rain``.
+
+    Returns:
+        Float (shells, INTENSITY_RANKS) and (shells,).
+    """
+    all_rain, all_rest = rain.sum(1, keepdim=True), rest.sum(1, keepdim=True)
+    points = all_rain + all_rest
+    usual = (rain + rest + LEAST_COUNT) / (points + LEAST_COUNT * INTENSITY_RANKS)
+    of_rain = (rain + PSEUDO_POINTS * usual) / (all_rain + PSEUDO_POINTS)
+    of_rest = (rest + PSEUDO_POINTS * usual) / (all_rest + PSEUDO_POINTS)
+    log_odds = (of_rain.log() - of_rest.log()).clamp(-LARGEST_LOG_ODDS, LARGEST_LOG_ODDS)
+    return log_odds, (of_rain * log_odds).sum(1)
 
 
 def _smoothed(counts: Tensor) -> Tensor:

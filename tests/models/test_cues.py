@@ -162,6 +162,15 @@ def smoothed(counts: np.ndarray) -> np.ndarray:
     return counts
 
 
+def expected(rain: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """Log-odds by shell and rank, of counts that are smoothed."""
+    both = rain + rest + 1e-12
+    usual = 100 * both / both.sum(1, keepdims=True)
+    in_rain = (rain + usual) / (rain.sum(1, keepdims=True) + 100)
+    in_rest = (rest + usual) / (rest.sum(1, keepdims=True) + 100)
+    return np.log(in_rain / in_rest).clip(-LARGEST_LOG_ODDS, LARGEST_LOG_ODDS)
+
+
 @given(st.integers(0, 2**32 - 1))
 def test_log_odds_are_those_of_smoothed_counts(seed: int) -> None:
     counts, cell, probability = drawn(seed)
@@ -171,16 +180,13 @@ def test_log_odds_are_those_of_smoothed_counts(seed: int) -> None:
         rain[place] += p
         rest[place] += 1 - p
     rain, rest = smoothed(rain), smoothed(rest)
-    both = rain + rest + 1e-12
-    usual = 100 * both / both.sum(1, keepdims=True)
-    in_rain = (rain + usual) / (rain.sum(1, keepdims=True) + 100)
-    in_rest = (rest + usual) / (rest.sum(1, keepdims=True) + 100)
-    expected = np.log(in_rain / in_rest).clip(-LARGEST_LOG_ODDS, LARGEST_LOG_ODDS)
     found = calibrated(counts, cell, probability)
     log_odds = found.log_odds.reshape(SHELLS, INTENSITY_RANKS).numpy()
-    occurring = both > 0.1
-    np.testing.assert_allclose(log_odds[occurring], expected[occurring], atol=1e-4)
+    occurring = rain + rest > 0.1
+    np.testing.assert_allclose(log_odds[occurring], expected(rain, rest)[occurring], atol=1e-4)
     np.testing.assert_allclose(found.rain, rain.sum(1), rtol=1e-9)
+    of_scan = expected(rain.sum(0)[None], rest.sum(0)[None])[0]
+    np.testing.assert_allclose(found.at_any_range, of_scan, atol=1e-4)
 
 
 def test_where_all_are_alike_or_none_is_rain_brightness_means_nothing() -> None:

@@ -99,7 +99,7 @@ def test_neighbours_are_the_nearest_of_all_points() -> None:
 
 
 def test_of_equally_near_neighbours_the_first_row_comes_first() -> None:
-    lattice = np.stack(np.meshgrid(*3 * [np.arange(8.0)]), axis=-1).reshape(-1, 3) * 3 + 5
+    lattice = np.stack(np.meshgrid(*3 * [np.arange(10.0)]), axis=-1).reshape(-1, 3) * 3 + 5
     xyz = np.random.default_rng(0).permutation(lattice).astype(np.float32)
     seen = VIEW(Scan(xyz))
     rows = seen.first[seen.neighbours]
@@ -154,17 +154,17 @@ def test_scans_of_a_batch_stay_apart() -> None:
     assert packed["step"].shape == (2,)
 
 
-def test_crowding_is_what_is_near_along_the_curve() -> None:
+def test_crowding_is_what_is_near_along_the_curve_and_near_the_least_crowded_there() -> None:
     xyz = scene(300)[:, :3].astype(np.float32)
     step = 0.01
     distance = np.linalg.norm(xyz, axis=1)
-    expected = np.zeros(len(xyz))
-    for one in range(len(xyz)):
-        for other in range(max(one - WINDOW, 0), min(one + WINDOW + 1, len(xyz))):
-            if other != one:
-                steps = np.linalg.norm(xyz[other] - xyz[one]) / (distance[one] * step)
-                expected[one] += 1 / (1 + (steps / HALF_AT) ** 2)
-    np.testing.assert_allclose(crowding(xyz, step), expected, rtol=1e-4)
+    near = np.zeros(len(xyz))
+    windows = [slice(max(one - WINDOW, 0), one + WINDOW + 1) for one in range(len(xyz))]
+    for one, window in enumerate(windows):
+        steps = np.linalg.norm(xyz[window] - xyz[one], axis=1) / (distance[one] * step)
+        near[one] = (1 / (1 + (steps / HALF_AT) ** 2)).sum() - 1  # without the point itself
+    expected = near + [near[window].min() for window in windows]
+    np.testing.assert_allclose(crowding(xyz, step), expected, rtol=1e-4, atol=1e-6)
     assert not crowding(xyz[:1], step).any()
 
 
