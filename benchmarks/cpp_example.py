@@ -22,7 +22,7 @@ from derain.export.runtime import Derainer
 from derain.system.stopwatch import Stopwatch
 
 STAGES = ("view", "network", "back")
-SAID = re.compile("rain, " + ", ".join(rf"{stage} ([\d.]+) ms" for stage in STAGES))
+PRINTED = re.compile("rain, " + ", ".join(rf"{stage} ([\d.]+) ms" for stage in STAGES))
 
 Times = NDArray[np.float64]  # (scans, stages), milliseconds
 
@@ -74,7 +74,7 @@ def by_program(model: Path, arguments: argparse.Namespace) -> tuple[list[NDArray
             [*command, *scans, *scans], check=True, capture_output=True, text=True
         )
         labels = [np.fromfile(Path(out) / f"{scan.stem}.label", "<u4") == 1 for scan in scans]
-    taken = np.array(SAID.findall(done.stdout), np.float64)
+    taken = np.array(PRINTED.findall(done.stdout), np.float64)
     return labels, taken[len(scans) :]
 
 
