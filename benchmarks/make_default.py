@@ -7,16 +7,16 @@ It is trained by `cues_worlds.yaml`, on worlds alone. Leaves ``model.onnx`` and 
 ``OUT/seed_<seed>``, and the table that the threshold was chosen by. That is the one of highest IoU
 over the worlds that were held out, raised until neither the dry ones among them together nor any
 clean scan that is given loses more than MOST_TAKEN, as long as that costs no more than MOST_LOST of
-the IoU. What is added to the log-odds
-of scans without intensities makes the model agree best with itself, as it judges unlabelled scans
-with their intensities; it is no more than clean scans without any allow. No label of a real scan is
-read.
+the IoU. What is added to the log-odds of scans without intensities makes the model agree best with
+itself, as it judges unlabelled recordings with their intensities; it is no more than clean scans
+allow, judged without theirs. No label of a real scan is read.
 """
 
 import argparse
 import json
 import shutil
 import subprocess
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -45,8 +45,8 @@ WORLDS = "runs/worlds"
 THRESHOLDS = tuple(np.round(np.arange(0.3, 0.951, 0.05), 2).tolist())
 
 # What may be added to the log-odds of scans without intensities; 0 where there are no unlabelled
-# scans to choose by.
-ADDED = tuple(np.arange(0, 4.01, 0.25).tolist())
+# recordings to choose by.
+ADDED = tuple(np.arange(0, 4.01, 0.5).tolist())
 
 # Share of clean points that may be taken, and of the highest IoU that may be given for it.
 MOST_TAKEN = 3e-4
@@ -76,11 +76,8 @@ def main() -> None:
         rain=tuple(card.rain),
     )
     model.hparams["threshold"] = threshold
-    agreement = _agreement(derainer, _scans(arguments.unlabelled), threshold)
-    dark = [scan for scan in _scans(arguments.clean) if scan.measured_intensity is None]
-    taken_more = [_taken_when_added(derainer, scan, threshold) for scan in dark]
-    possible = [one for one in ADDED if all(of[one] <= MOST_TAKEN for of in taken_more)]
-    added = max(possible, key=lambda one: agreement[one], default=0.0)
+    agreement = _agreements(model, threshold, arguments.unlabelled, arguments.clean)
+    added = max(agreement, key=lambda one: agreement[one], default=0.0)
     model.hparams["without_intensity"] = model.network.without_intensity = added
     model.adopt(spec)
     save_model(model, out / "model.ckpt")
@@ -91,7 +88,7 @@ def main() -> None:
     content = {"threshold": threshold, "iou": iou, "taken": taken, "agreement": agreement}
     (out / "threshold.json").write_text(json.dumps(content, indent=2) + "\n", "utf-8")
     print(table)
-    print(f"added without intensities: {added:g}; IoU with itself {agreement[added]:.3f}")
+    print("added without intensities, and IoU with itself:", agreement)
 
 
 def trained(folder: Path, training: Path, seed: int) -> Path:
@@ -171,30 +168,39 @@ def _scans(paths: Sequence[Path]) -> Iterator[Scan]:
         yield from (frame.read() for frame in named_frames(paths))
 
 
-def _agreement(derainer: Derainer, scans: Iterator[Scan], threshold: float) -> dict[float, float]:
-    """IoU of what is called rain with intensities and without, by what is added without them."""
-    both, either = np.zeros(len(ADDED)), np.zeros(len(ADDED))
-    for scan in scans:
-        called = derainer.probability(scan) > threshold
-        without_any = derainer.probability(replace(scan, intensity=None))
-        for number, added in enumerate(ADDED):
-            without = _log_odds(without_any) + added > _log_odds(np.float32(threshold))
-            both[number] += np.count_nonzero(called & without)
-            either[number] += np.count_nonzero(called | without)
-    return dict(zip(ADDED, (both / np.maximum(either, 1)).tolist(), strict=True))
+def _agreements(
+    model: CueFusion, threshold: float, recordings: Sequence[Path], clean: Sequence[Path]
+) -> dict[float, float]:
+    """Agreement of the model with itself by what is added, where clean scans allow it."""
+    agreements: dict[float, float] = {}
+    for added in ADDED if recordings else ():
+        model.network.without_intensity = added
+        with tempfile.TemporaryDirectory() as folder:
+            export(model, Path(folder) / "model.onnx")
+            derainer = Derainer(Path(folder) / "model.onnx")
+        taken = (_taken(derainer, _blank(scan))[threshold] for scan in _scans(clean))
+        if all(share <= MOST_TAKEN for share in taken):
+            agreements[added] = _agreement(derainer, recordings, threshold)
+    return agreements
 
 
-def _taken_when_added(derainer: Derainer, scan: Scan, threshold: float) -> dict[float, float]:
-    """Share of the points of a scan without intensities called rain, by what is added."""
-    log_odds = _log_odds(derainer.probability(scan)[scan.valid])
-    least = _log_odds(np.float32(threshold))
-    return {added: float((log_odds + added > least).mean()) for added in ADDED}
+def _agreement(derainer: Derainer, recordings: Sequence[Path], threshold: float) -> float:
+    """IoU of what is called rain with intensities and without, the mean over recordings."""
+    of_recordings = []
+    for recording in recordings:
+        both = either = 0
+        for scan in _scans([recording]):
+            with_them, without = (
+                derainer.probability(one) > threshold for one in (scan, _blank(scan))
+            )
+            both += np.count_nonzero(with_them & without)
+            either += np.count_nonzero(with_them | without)
+        of_recordings.append(both / max(either, 1))
+    return float(np.mean(of_recordings))
 
 
-def _log_odds(probability: NDArray[np.float32] | np.float32) -> NDArray[np.float64]:
-    known = np.clip(np.float64(probability), 1e-9, 1 - 1e-9)
-    log_odds: NDArray[np.float64] = np.log(known / (1 - known))
-    return log_odds
+def _blank(scan: Scan) -> Scan:
+    return replace(scan, intensity=None)
 
 
 def _table(
@@ -226,7 +232,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--seed", type=int, default=0, help="of the training")
     parser.add_argument("--clean", type=Path, nargs="*", default=[], help="clean scans")
     parser.add_argument(
-        "--unlabelled", type=Path, nargs="*", default=[], help="scans with intensities"
+        "--unlabelled", type=Path, nargs="*", default=[], help="recordings with intensities"
     )
     return parser
 

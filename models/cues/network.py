@@ -47,6 +47,10 @@ PSEUDO_POINTS = 100.0
 # Log-odds of brightness never exceed this, either way.
 LARGEST_LOG_ODDS = 6.0
 
+# The least share of rain in a rainy scan; see ``without_intensity``.
+# Source: modelling choice.
+RAINY = 0.01
+
 # Added to counts that others are divided by, or of which logarithms are taken.
 LEAST_COUNT = 1e-6
 
@@ -71,8 +75,9 @@ class CueNetwork(nn.Module):
         opinion: Features that a point passes to the points that it is a neighbour of.
         context: Features of what a scan holds at some range.
         fusion: Features of a point in the two hidden layers of a fusion.
-        without_intensity: Added to the log-odds of a scan whose intensities are not known or all
-            the same: geometry alone is less sure of rain than both cues are.
+        without_intensity: Added to the log-odds of a rainy scan whose intensities are not known or
+            all the same: geometry alone is less sure of rain than both cues are. Less is added to
+            scans of less rain, in proportion, so that a dry scan stays whole.
     """
 
     def __init__(
@@ -144,9 +149,21 @@ class CueNetwork(nn.Module):
                 given = cues.around(answers[-1])
             weighed = fusion(torch.cat([given, features]))[0]
             answers.append(rain.scatter(0, doubtful, weighed))
-        unknown = (counts[:, 1:].sum() == 0).to(rain.dtype)
-        answers = [answer + self.without_intensity * unknown for answer in answers]
-        return [*answers, without_carrier(answers[-1], far, counts.double().sum())]
+        size = counts.double().sum()
+        if_unknown = self.without_intensity * (counts[:, 1:].sum() == 0).to(rain.dtype)
+        answers = [answer + if_unknown * _raininess(answer, size) for answer in answers]
+        return [*answers, without_carrier(answers[-1], far, size)]
+
+
+def _raininess(rain: Tensor, size: Tensor) -> Tensor:
+    """From 0 for a dry scan to 1 for a rainy one, by its log-odds of rain, float ().
+
+    Args:
+        rain: Log-odds of rain of the isolated points, float (S,).
+        size: Number of all points of the scan, float64 ().
+    """
+    share = rain.sigmoid().double().sum() / size.clamp_min(1)
+    return (share / RAINY).clamp(max=1).to(rain.dtype)
 
 
 def _numbers(neighbours: Tensor, points: int) -> Tensor:

@@ -1,5 +1,6 @@
 """Cues: what the network makes of a scan's brightness, in whatever unit, order and direction."""
 
+from copy import deepcopy
 from dataclasses import replace
 
 import numpy as np
@@ -63,6 +64,29 @@ def test_brightness_helps_whatever_its_unit(exported: Derainer) -> None:
     np.testing.assert_array_equal(exported(labelled(20, gain=1 / 255)), called)
     alike = exported(replace(scan, intensity=np.full(len(scan), 7, np.float32)))
     assert iou(alike) < iou(called) - 0.05
+
+
+@pytest.mark.parametrize("doubt", [0, 4, 8])
+def test_without_intensities_rain_is_the_likelier_the_more_of_it_there_is(
+    trained: CueFusion, doubt: float
+) -> None:
+    scan, network, view = labelled(23), deepcopy(trained.network), trained.spec.make_view()
+    network.rounds[-1][-1].bias.data -= doubt
+
+    def answer(scan: Scan, added: float) -> Tensor:
+        inputs = {name: torch.from_numpy(each) for name, each in view(scan).inputs().items()}
+        inputs |= {"step": inputs["step"][0], "counts": inputs["counts"][0]}
+        network.without_intensity = added
+        with torch.no_grad():
+            return network.answers(**inputs)[-2]
+
+    dark = replace(scan, intensity=None)
+    usual = answer(dark, 0)
+    rain = float(usual.sigmoid().sum()) / len(scan)
+    assert (rain > 0.01) == (doubt == 0)
+    raised = torch.full_like(usual, 2 * min(rain / 0.01, 1))
+    torch.testing.assert_close(answer(dark, 2) - usual, raised, rtol=1e-3, atol=1e-5)
+    torch.testing.assert_close(answer(scan, 2), answer(scan, 0))
 
 
 @pytest.mark.parametrize(("drops", "are_rain"), [(0, False), (60, True)])
