@@ -209,6 +209,13 @@ class Scan:
         valid.setflags(write=False)  # it is everybody's
         return valid
 
+    @cached_property
+    def lacks_intensity(self) -> NDArray[np.bool_]:
+        """True for points that would be valid if their intensity was possible, bool (N,)."""
+        if self.valid.all():
+            return ~self.valid
+        return replace(self, intensity=None).valid & ~self.valid
+
     def channel(self, name: str) -> NDArray[np.float32] | None:
         """One value per point, by name.
 

@@ -76,6 +76,16 @@ class Model:
         return of_points[inverse]
 
     def _of_isolated(self, points: Points) -> NDArray[np.float32]:
+        """Rows without a possible intensity are judged as in a scan that has none."""
+        blank = points.copy()
+        blank[:, 3] = np.nan
+        dark = valid_rows(blank) & ~valid_rows(points)
+        result = self._of_isolated_of_valid(points)
+        if dark.any():
+            result[dark] = self._of_isolated_of_valid(blank)[dark]
+        return result
+
+    def _of_isolated_of_valid(self, points: Points) -> NDArray[np.float32]:
         inputs, inverse = isolated_view(points, self.spec)
         of_points = np.zeros(len(inputs["points"]) + 1, np.float32)  # the last for invalid rows
         of_points[inputs["neighbours"][:, 0]] = self._probability(inputs)

@@ -28,7 +28,7 @@ from derain.sources.recent_frames import FrameInWindow, RecentFrames
 from derain.system.cores import threads_of
 from derain.system.stopwatch import Stopwatch
 from derain.views.probability import probability_of_rain
-from derain.views.scan_issues import ScanIssue, outside_view
+from derain.views.scan_issues import ScanIssue, intensity_in_places, outside_view
 from derain.views.view import View, ViewedScan
 from derain.views.window import PlacedScan, Window
 from derain.weather.scan_weather import ScanWeather
@@ -104,7 +104,8 @@ class Derainer(Method):
 
         Returns:
             True for rain, bool (N,), in input order; False for rows that cannot be judged, or that
-            the model's candidates leave out.
+            the model's candidates leave out. A model of cues judges points of no possible
+            intensity as in a scan without intensities.
         """
         return self.judge(points, stopwatch).rain
 
@@ -142,8 +143,16 @@ class Derainer(Method):
         self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None
     ) -> Judgement:
         """As :meth:`judge`, without warnings."""
-        scan = Scan.of(points)
-        return self._judged(scan, lambda: self.view(scan), stopwatch or Stopwatch())
+        scan, stopwatch = Scan.of(points), stopwatch or Stopwatch()
+        judgement = self._judged(scan, lambda: self.view(scan), stopwatch)
+        dark = scan.lacks_intensity
+        if not (self.view.WEIGHS_INTENSITY and dark.any()):
+            return judgement
+        blank = replace(scan, intensity=None)
+        of_blank = self._judged(blank, lambda: self.view(blank), stopwatch)
+        probability = np.where(dark, of_blank.probability, judgement.probability)
+        rain = np.where(dark, of_blank.rain, judgement.rain)
+        return Judgement(probability, rain, judgement.judged | dark, scan)
 
     def weather(self, points: Scan | NDArray[Any]) -> ScanWeather:
         """Returns the weather that a scan shows: shares of rain, and visibility.
@@ -248,6 +257,7 @@ class Derainer(Method):
 
     def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
         """Warnings about a scan for the model, and whether much of it lies outside its grid."""
+        yield from intensity_in_places(judgement.scan, judgement.judged)
         yield from self.spec.issues(judgement.scan)
         yield from outside_view(judgement.scan, judgement.judged, self.spec.data)
 

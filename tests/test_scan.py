@@ -61,8 +61,12 @@ def test_valid_is_what_a_look_at_each_row_says(points: NDArray[np.float32]) -> N
     # Where not one intensity is a number, the column tells nothing of any point.
     known = any(abs(row[3]) <= 1e7 for row in rows)
     expected = [can_be_judged(row[:3], row[3] if known else None) for row in rows]
-    assert Scan.of(points).valid.tolist() == expected
-    assert Scan.of(points[:, :3]).valid.tolist() == [can_be_judged(row[:3], None) for row in rows]
+    blank = [can_be_judged(row[:3], None) for row in rows]
+    scan = Scan.of(points)
+    assert scan.valid.tolist() == expected
+    assert Scan.of(points[:, :3]).valid.tolist() == blank
+    lacking = [place and not both for place, both in zip(blank, expected, strict=True)]
+    assert scan.lacks_intensity.tolist() == lacking
 
 
 @given(

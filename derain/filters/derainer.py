@@ -17,7 +17,7 @@ from derain.system.cores import threads_of
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
 from derain.views.one_viewpoint import viewpoint_issues
-from derain.views.scan_issues import ScanIssue
+from derain.views.scan_issues import ScanIssue, intensity_in_places
 from derain.views.window import Window
 from derain.weather.scan_weather import ScanWeather
 
@@ -142,6 +142,7 @@ class FilterDerainer(Method):
     def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
         """Warnings about a scan for the filter, or for any method that uses places."""
         yield from viewpoint_issues(judgement.scan)
+        yield from intensity_in_places(judgement.scan, judgement.judged)
         yield from self.filter.issues(judgement.scan)
 
     def as_dict(self) -> dict[str, Any]:

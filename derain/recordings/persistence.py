@@ -21,7 +21,7 @@ from derain.system.cores import threads_of
 from derain.system.registry import from_parameters
 from derain.system.stopwatch import Stopwatch
 from derain.views.one_viewpoint import viewpoint_issues
-from derain.views.scan_issues import ScanIssue
+from derain.views.scan_issues import ScanIssue, intensity_in_places
 from derain.views.window import Window, WindowOfScans
 
 # Scans kept at a time are bounded: each takes some 30 MB with its neighbours and rays.
@@ -141,6 +141,7 @@ class PersistenceDerainer(RecordingMethod):
     def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
         """Warnings about a scan: its places, nothing known of it, or no pose to be trusted."""
         yield from viewpoint_issues(judgement.scan)
+        yield from intensity_in_places(judgement.scan, judgement.judged)
         yield from self._recent.doubts(judgement.scan)
         if judgement.known is not None and not judgement.known.any() and judgement.judged.any():
             yield ScanIssue(

@@ -45,9 +45,14 @@ class Judgement:
         return self.judged if self.known is None else self.judged & self.known
 
     @property
+    def possible(self) -> NDArray[np.bool_]:
+        """True for points that can be judged, bool (N,): the valid ones, and all that were."""
+        return self.scan.valid | self.judged
+
+    @property
     def share_of_rain(self) -> float:
         """Share of rain among the points that can be judged; 0 where there are none."""
-        return int(self.rain.sum()) / max(int(self.scan.valid.sum()), 1)
+        return int(self.rain.sum()) / max(int(self.possible.sum()), 1)
 
     @cached_property
     def weather(self) -> ScanWeather:

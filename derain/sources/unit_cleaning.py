@@ -152,7 +152,7 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
             measured = packed(judgement.weather) if due else None
         with stopwatch.stage("write"):
             sink.write(judgement)
-        valid, known = scan.valid, judgement.known
+        valid, known = judgement.possible, judgement.known
         figures = CleanedScan(
             scan=frame.name,
             points=len(valid),

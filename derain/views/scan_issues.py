@@ -165,6 +165,22 @@ def much_removed(share: float) -> Iterator[ScanIssue]:
         )
 
 
+def intensity_in_places(scan: Scan, judged: NDArray[np.bool_]) -> Iterator[ScanIssue]:
+    """Yields an issue if some points of a scan have no possible intensity, and others have.
+
+    Args:
+        scan: The scan.
+        judged: Rows that the method judged, bool (N,).
+    """
+    lacking = scan.lacks_intensity
+    if lacking.any():
+        result = "judged without it" if judged[lacking].any() else "not judged, and stay"
+        yield ScanIssue(
+            "no intensity in places",
+            f"no possible intensity at {np.count_nonzero(lacking):,} points: they are {result}",
+        )
+
+
 def no_points(scan: Scan) -> Iterator[ScanIssue]:
     """Yields an issue if a scan holds no points, which is valid but hardly intended."""
     if not len(scan):

@@ -30,11 +30,26 @@ class Derainer {
   // The probability of rain of each row of a scan.
   std::vector<float> probability(const Scan& scan, Times& times) {
     if (spec().range) return judged(scan, times, range_view);
-    if (spec().isolated) return judged(scan, times, isolated_points);
+    if (spec().isolated) return of_isolated(scan, times);
     return judged(scan, times, neighbour_view);
   }
 
  private:
+  // Rows without a possible intensity are judged as in a scan that has none.
+  std::vector<float> of_isolated(const Scan& scan, Times& times) {
+    std::vector<float> result = judged(scan, times, isolated_points);
+    const Scan blank = without_intensity(scan);
+    const std::vector<bool> valid = valid_rows(scan), valid_in_blank = valid_rows(blank);
+    if (valid == valid_in_blank) return result;
+    Times more;
+    const std::vector<float> of_blank = judged(blank, more, isolated_points);
+    for (std::size_t row = 0; row < scan.size(); ++row) {
+      if (valid_in_blank[row] && !valid[row]) result[row] = of_blank[row];
+    }
+    times = {times.view + more.view, times.network + more.network, times.back + more.back};
+    return result;
+  }
+
   template <typename MakeView>
   std::vector<float> judged(const Scan& scan, Times& times, const MakeView& make_view) {
     const auto began = Clock::now();

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -47,6 +48,14 @@ inline Scan read_scan(const std::filesystem::path& path) {
   file.seekg(0);
   file.read(reinterpret_cast<char*>(scan.values.data()), static_cast<std::streamsize>(bytes));
   if (!file) throw InputError(path.string(), "it cannot be read to its end", "Copy it again.");
+  return scan;
+}
+
+// The same scan with intensities that are not known.
+inline Scan without_intensity(Scan scan) {
+  for (std::size_t at = kColumns - 1; at < scan.values.size(); at += kColumns) {
+    scan.values[at] = std::numeric_limits<float>::quiet_NaN();
+  }
   return scan;
 }
 

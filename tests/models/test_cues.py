@@ -104,6 +104,19 @@ def test_dim_specks_right_before_the_sensor_alone_are_its_carrier(
     assert ((specks > 0.5) == are_rain).all()
 
 
+def test_points_without_intensity_are_judged_as_in_a_scan_that_has_none(exported: Derainer) -> None:
+    scan = labelled(25)
+    dark = np.arange(len(scan)) % 3 == 0
+    intensity = np.where(dark, np.float32(np.nan), scan.intensity)
+    judgement = exported.judge_silently(replace(scan, intensity=intensity))
+    of_blank = exported.probability(replace(scan, intensity=None))
+    np.testing.assert_array_equal(judgement.probability[dark], of_blank[dark])
+    of_others = exported.probability(scan.take(~dark))
+    np.testing.assert_array_equal(judgement.probability[~dark], of_others)
+    assert judgement.judged.all()
+    assert judgement.share_of_rain == judgement.rain.mean()
+
+
 def test_rows_in_another_order_are_judged_alike(exported: Derainer) -> None:
     scan = labelled(21)
     order = np.random.default_rng(0).permutation(len(scan))

@@ -18,6 +18,7 @@ from derain.views.scan_issues import (
     HEAVIEST_RAIN,
     MOST_OUTSIDE,
     ScanChecker,
+    intensity_in_places,
     left_out,
     much_removed,
     outside_view,
@@ -152,3 +153,13 @@ def test_ssr_and_the_rule_find_nothing_where_intensity_was_not_measured() -> Non
     assert not FilterDerainer(SSR(threshold=1e9))(scan).any()
     assert not IntensityRule(1e6, 1e6)(scan).any()
     assert IntensityRule(1e6, 1e6)(with_intensity(0, 99)).all()
+
+
+@pytest.mark.parametrize(("judged", "result"), [(True, "judged without it"), (False, "stay")])
+def test_intensity_that_is_missing_in_places_is_counted(judged: bool, result: str) -> None:
+    intensity = np.arange(300, dtype=np.float32)
+    assert not list(intensity_in_places(with_intensity(intensity), np.ones(300, bool)))
+    intensity[::3] = [np.nan, np.inf] * 50
+    (issue,) = intensity_in_places(with_intensity(intensity), np.full(300, judged))
+    assert "100 points" in issue.detail
+    assert result in issue.detail
