@@ -29,11 +29,7 @@ DOUBTFUL = 0.01
 # Log-odds of rain that rays of other scans add to those of the model, fitted to simulated drives by
 # benchmarks/persistence_weights.py: for the share of them that ends at a place, and for the share
 # that went through it.
-OF_ENDING, OF_THROUGH = -10.35, 0.89
-
-# How much of them is added: the model has seen part of it, and drives differ from simulated ones.
-# Source: modelling choice.
-SHARE_ADDED = 0.5
+OF_ENDING, OF_THROUGH = -9.81, 0.6
 
 # A judgement of another scan by itself, and what takes the frame of the scan that is judged to that
 # of the other, float64 (4, 4), metres.
@@ -185,7 +181,7 @@ class RecordedDerainer(Method):
         probability = alone.probability.copy()
         certain = np.finfo(np.float64).eps
         before = np.clip(probability[doubtful].astype(np.float64), certain, 1 - certain)
-        log_odds = np.log(before / (1 - before)) + SHARE_ADDED * added_log_odds(evidence)
+        log_odds = np.log(before / (1 - before)) + added_log_odds(evidence)
         probability[doubtful] = 1 / (1 + np.exp(-log_odds))
         return probability
 
