@@ -21,7 +21,7 @@ def test_every_reader_reads_refuses_and_never_breaks(
     shutil.copy(onnx_model, models)
     shutil.copy(checkpoint, models)
     options = ["--models", str(models), "--out", str(tmp_path / "findings")]
-    code = main(["--inputs", "600", "--seed", "0", *options])
+    code = main(["--inputs", "400", "--seed", "0", *options])
     table = capsys.readouterr().out
     assert code == 0, table
     rows = [line.split() for line in table.splitlines()[1:]]

@@ -42,22 +42,21 @@ def reader() -> Iterator[ModuleType]:
         del sys.modules["onnx_reader"]
 
 
-def agree(reader: ModuleType, path: Path, points: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Judges a scan by the reader and by derain, and gives what both call rain."""
+def agree(reader: ModuleType, path: Path, *scans: NDArray[np.float32]) -> None:
+    """Judges scans by the reader and by derain, and compares the answers."""
     theirs, ours = reader.Model(str(path)), Derainer(path, threads=1)
-    np.testing.assert_allclose(theirs.judge(points), ours.probability(points), rtol=0, atol=1e-6)
-    rain = ours(points)
-    np.testing.assert_array_equal(theirs.rain(points), rain)
-    return rain
+    for points in scans:
+        judgement = ours.judge(points)
+        np.testing.assert_allclose(theirs.judge(points), judgement.probability, rtol=0, atol=1e-6)
+        np.testing.assert_array_equal(theirs.rain(points), judgement.rain)
 
 
 def test_of_neighbours_it_makes_what_derain_makes(
     reader: ModuleType, judging_candidates: Path
 ) -> None:
     for model in (default_model(), judging_candidates, KEPT):  # the last of an early derain
-        for points in SCANS.values():
-            agree(reader, model, points)
-    assert 0 < agree(reader, default_model(), hard_points()).mean() < 0.9
+        agree(reader, model, hard_points(), *SCANS.values())
+    assert 0 < Derainer(default_model(), threads=1)(hard_points()).mean() < 0.9
 
 
 @pytest.mark.parametrize("way_back", BACK_PROJECTIONS)
@@ -76,8 +75,7 @@ def test_of_images_it_makes_what_derain_makes_whichever_way_scores_come_back(
     for bounds in (None, candidates):
         changed = replace(spec, view=view, candidates=bounds)
         (tmp_path / "changed.onnx").write_bytes(with_metadata(proto, {"spec": changed.as_dict()}))
-        for points in (*SCANS.values(), scene(800)):
-            agree(reader, tmp_path / "changed.onnx", points)
+        agree(reader, tmp_path / "changed.onnx", *SCANS.values(), scene(800))
 
 
 @pytest.mark.parametrize(
