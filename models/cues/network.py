@@ -240,7 +240,6 @@ class Cues:
         of_all = torch.cat([rain, rain.new_full((1,), OF_CROWDED)])
         of_others = taken(of_all, self._others)
         brightness = taken(second.log_odds, self._cell_of_others)
-        shell = torch.div(self._cell, INTENSITY_RANKS, rounding_mode="floor")
         of_scan = torch.log1p(rain.sigmoid().double().sum()).to(rain.dtype)
         return torch.stack(
             [
@@ -254,9 +253,9 @@ class Cues:
                 brightness.amax(dim=0) / 2,
                 of_others.amin(dim=0) / 4,
                 brightness.amin(dim=0) / 2,
-                taken(torch.log1p(second.rain), shell) / 4,
-                taken(second.separation, shell),
-                taken(second.share, shell),
+                taken(_of_every_rank(torch.log1p(second.rain)), self._cell) / 4,
+                taken(_of_every_rank(second.separation), self._cell),
+                taken(_of_every_rank(second.share), self._cell),
                 (of_scan / 4).expand_as(own),
                 taken(second.at_any_range, self._rank) / 2,
                 taken(second.at_any_range, self._rank_of_others).mean(dim=0) / 2,
@@ -318,6 +317,15 @@ def calibrated(counts: Tensor, cell: Tensor, probability: Tensor) -> Brightness:
         separation_at_any_range[0],
     )
     return Brightness(*(result.to(probability.dtype) for result in results))
+
+
+def _of_every_rank(of_shells: Tensor) -> Tensor:
+    """One number of each shell, repeated for its ranks, float (SHELLS * INTENSITY_RANKS,).
+
+    So that no cell has to be divided into shell and rank: runtimes that compute in bfloat16 divide
+    whole numbers in it, too.
+    """
+    return of_shells[:, None].expand(-1, INTENSITY_RANKS).flatten()
 
 
 def _log_odds(rain: Tensor, rest: Tensor) -> tuple[Tensor, Tensor]:

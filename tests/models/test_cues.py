@@ -85,8 +85,9 @@ def test_without_intensities_rain_is_the_likelier_the_more_of_it_there_is(
     rain = float(usual.sigmoid().sum()) / len(scan)
     assert (rain > 0.01) == (doubt == 0)
     raised = torch.full_like(usual, 2 * min(rain / 0.01, 1))
-    torch.testing.assert_close(answer(dark, 2) - usual, raised, rtol=1e-3, atol=1e-5)
-    torch.testing.assert_close(answer(scan, 2), answer(scan, 0))
+    # Sums of many floats may differ from one call to the next, by how threads share them.
+    torch.testing.assert_close(answer(dark, 2) - usual, raised, rtol=0, atol=1e-3)
+    torch.testing.assert_close(answer(scan, 2), answer(scan, 0), rtol=0, atol=1e-3)
 
 
 @pytest.mark.parametrize(("drops", "are_rain"), [(0, False), (60, True)])
