@@ -15,6 +15,7 @@ import onnx
 import pytest
 from onnx import helper
 
+from derain.default import default_checkpoint, default_model
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export.model_file import METADATA_KEY
@@ -47,9 +48,16 @@ def model_in_bfloat16() -> Derainer:
         pytest.skip(str(error))
 
 
-def test_float32_is_onnxruntimes_on_every_hard_case() -> None:
-    network = load_model(KEPT / "outdet.ckpt")
-    found = prove(network, KEPT / "outdet.onnx", HARD_CASES.items(), FLOAT32, OPENVINO)
+MODELS = {
+    "outdet": (KEPT / "outdet.ckpt", KEPT / "outdet.onnx"),
+    "default": (default_checkpoint(), default_model()),
+}
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_float32_is_onnxruntimes_on_every_hard_case(name: str) -> None:
+    checkpoint, model = MODELS[name]
+    found = prove(load_model(checkpoint), model, HARD_CASES.items(), FLOAT32, OPENVINO)
     assert found.holds, str(found)
     assert {case.runtime for case in found.cases} == {"openvino"}
     assert found.flipped == 0
