@@ -244,7 +244,7 @@ class WholeConfig(SaveConfigCallback):
         elif trainer.is_global_zero and not self.already_saved:
             name = "test.yaml" if stage == "test" else self.config_filename
             with replacing(Path(folder) / name) as temporary:
-                self.parser.save(self.config, temporary, skip_none=False, overwrite=True)
+                self.parser.save(self.config, temporary, skip_unset=False, overwrite=True)
             self.already_saved = True
 
 
