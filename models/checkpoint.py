@@ -20,10 +20,10 @@ from derain.files.documents import Entry, shown
 from derain.files.reading import reading
 from derain.learning.start import Start
 from derain.models.base import DerainingModule
-from derain.models.callbacks.resumption import LARGEST_COUNT, REMEDY, matching_state
 from derain.models.limits import check_hyperparameters
 from derain.models.published import LOAD_ERRORS, read_checkpoint, with_tensors
 from derain.models.registry import NETWORKS
+from derain.models.saved_state import LARGEST_COUNT, REMEDY, matching_state
 from derain.spec import Spec
 
 # Entries that Lightning requires in a checkpoint to resume a training.

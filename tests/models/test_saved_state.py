@@ -13,9 +13,9 @@ from benchmarks.fuzzing.checkpoints import HOSTILE, go_on, hostile, trained
 from derain.errors import InputError
 from derain.files.documents import Entry
 from derain.models.callbacks.best_checkpoint import BestCheckpoint
-from derain.models.callbacks.resumption import matching_state
 from derain.models.measured import MONITOR
 from derain.models.published import read_checkpoint
+from derain.models.saved_state import matching_state
 
 
 @pytest.fixture
