@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from contents import contents
 from recorded_scenes import write_scenes
 from window_method import Between, Dimmer
 
@@ -39,14 +40,6 @@ def make_drive(tmp_path: Path) -> MakeDrive:
         return folder
 
     return make
-
-
-def files(folder: Path) -> dict[str, bytes]:
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file()
-    }
 
 
 def of(drive: Path) -> Source:
@@ -84,7 +77,7 @@ def test_labels_are_what_the_method_says(
     assert [scan.number for scan in manifest.scans] == [*numbers]
     assert manifest.scans[-1].part == "validation"
     assert Manifest.read(out).teacher == make().as_dict()
-    assert {*files(out)} == {CARD, TAUGHT_MANIFEST, *(f"{LABELS}/{key}.label" for key in keys)}
+    assert {*contents(out)} == {CARD, TAUGHT_MANIFEST, *(f"{LABELS}/{key}.label" for key in keys)}
 
 
 def test_the_card_says_what_the_labels_mean(make_drive: MakeDrive, tmp_path: Path) -> None:
@@ -109,17 +102,21 @@ def test_truth_changes_no_byte(make_drive: MakeDrive, tmp_path: Path) -> None:
     teach(Between(), of(drive), tmp_path / "garbage")
     shutil.rmtree(truth)
     teach(Between(), of(drive), tmp_path / "without")
-    assert files(tmp_path / "with") == files(tmp_path / "garbage") == files(tmp_path / "without")
+    assert (
+        contents(tmp_path / "with")
+        == contents(tmp_path / "garbage")
+        == contents(tmp_path / "without")
+    )
 
 
 @pytest.mark.parametrize("labelled", [True, False])
 def test_labels_of_the_recording_stay(make_drive: MakeDrive, labelled: bool) -> None:
     drive = make_drive(labelled=labelled)
     (drive.parent / LABELS).mkdir(exist_ok=True)
-    before = files(drive.parent)
+    before = contents(drive.parent)
     with pytest.raises(InputError):
         teach(Between(), of(drive), drive.parent)
-    assert files(drive.parent) == before
+    assert contents(drive.parent) == before
 
 
 @pytest.mark.parametrize("name", [CARD, TAUGHT_MANIFEST, f"{LABELS}/000000.label"])
@@ -129,7 +126,7 @@ def test_what_is_no_teachers_stays(make_drive: MakeDrive, tmp_path: Path, name: 
     (out / name).write_text("mine")
     with pytest.raises(InputError, match="exists, and `derain teach` did not write it"):
         teach(Between(), of(make_drive()), out)
-    assert files(out) == {name: b"mine"}
+    assert contents(out) == {name: b"mine"}
 
 
 def test_a_second_teaching_takes_the_place_of_the_first(
@@ -139,7 +136,7 @@ def test_a_second_teaching_takes_the_place_of_the_first(
     teach(Between(), of(drive), out)
     teach(FilterDerainer(DROR(), 1), of(drive)[:4], out)
     teach(FilterDerainer(DROR(), 1), of(drive)[:4], tmp_path / "alone")
-    assert files(out) == files(tmp_path / "alone")
+    assert contents(out) == contents(tmp_path / "alone")
 
 
 @pytest.mark.parametrize("there", [True, False])
@@ -149,11 +146,11 @@ def test_what_fails_half_way_leaves_what_was_there(
     drive, out = make_drive(), tmp_path / "taught"
     if there:
         teach(Between(), of(drive), out)
-    before = files(out)
+    before = contents(out)
     (drive / "000003.bin").write_bytes(b"12345")
     with pytest.raises(InputError, match="000003"):
         teach(Between(), of(drive), out)
-    assert files(out) == before
+    assert contents(out) == before
     assert out.exists() == there
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from contents import contents
 from small_bags import small_bag
 
 import derain
@@ -52,12 +53,6 @@ def drive(tmp_path: Path) -> Path:
     return folder
 
 
-def in_folder(folder: Path) -> dict[str, bytes]:
-    """The results in a folder by their paths."""
-    files = [file for file in folder.rglob("*") if file.is_file() and ".derain" not in file.parts]
-    return {file.relative_to(folder).as_posix(): file.read_bytes() for file in files}
-
-
 def in_store(s3: Any, folder: str) -> dict[str, bytes]:
     """The results in a folder of the store by their paths."""
     keys = [key for key in s3.find(f"{BUCKET}/{folder}") if "/.derain/" not in key]
@@ -74,7 +69,7 @@ def test_a_store_that_fails_gives_the_bytes_of_a_folder_and_a_second_run_does_no
     first = succeed(*command)
     again = succeed(*command)
     FAULTS.refuse = FAULTS.cut = 0
-    assert in_store(s3, "out") == in_folder(tmp_path / "out")
+    assert in_store(s3, "out") == contents(tmp_path / "out")
     assert len(in_store(s3, "out")) == 2 * SCANS
     assert first.out.startswith("s3://drives/drive/000000.bin: ")
     assert f"{SCANS} scans ({SCANS} of them done before)" in again.out
@@ -113,7 +108,7 @@ def test_a_bag_of_a_store_is_cleaned_as_one_of_a_folder(
     assert rows_without_names(table) == rows_without_names(local)
     again = succeed(*command, "--weather", table)
     assert rows_without_names(table) == rows_without_names(local)
-    assert in_store(s3, "out") == in_folder(tmp_path / "out")
+    assert in_store(s3, "out") == contents(tmp_path / "out")
     assert "s3://drives/bags/drive" in first.out.splitlines()[0]
     assert "3 scans (3 of them done before)" in again.out
     if poses == "poses.txt":

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from contents import contents
 from recorded_scenes import write_scenes
 from window_method import Between
 
@@ -175,14 +176,6 @@ def command(drive: Path, out: Path, *options: object) -> tuple[object, ...]:
     return ("teach", "persistence", drive, "--out", out, *poses, "--card", "wads", *options)
 
 
-def files(folder: Path) -> dict[str, bytes]:
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file() and FOLDER not in path.parts
-    }
-
-
 def facts(printed: str) -> list[dict[str, Any]]:
     """The objects of the scans, without times."""
     found = [json.loads(line) for line in printed.splitlines()]
@@ -196,7 +189,7 @@ def test_workers_write_and_count_what_one_process_does_without_records(
 ) -> None:
     whole = succeed(*command(drive, tmp_path / "whole", "--json"))
     units = succeed(*command(drive, tmp_path / "units", "--json", "--workers", 2, "--block", 3))
-    assert files(tmp_path / "units") == files(tmp_path / "whole")
+    assert contents(tmp_path / "units") == contents(tmp_path / "whole")
     assert facts(units.out) == facts(whole.out)
     assert units.err == whole.err
     assert not (tmp_path / "whole" / FOLDER).exists()
@@ -208,7 +201,7 @@ def test_what_was_stopped_goes_on_with_the_same_figures(
     out = tmp_path / "out"
     options = ("--block", 2)
     first = succeed(*command(drive, out, *options, "--json"))
-    before = files(out)
+    before = contents(out)
     kept = out / FOLDER / "labels/000000.label"
     written = kept.stat().st_mtime_ns
     (out / FOLDER / "units/000002.json").unlink()
@@ -217,7 +210,7 @@ def test_what_was_stopped_goes_on_with_the_same_figures(
         (out / name).unlink()
     shutil.rmtree(out / LABELS)
     again = succeed(*command(drive, out, *options, "--json"))
-    assert files(out) == before
+    assert contents(out) == before
     assert facts(again.out) == facts(first.out)
     assert kept.stat().st_mtime_ns == written
 
@@ -235,7 +228,7 @@ def test_shards_put_the_labels_in_place_when_the_last_is_done(
     status = run_derain("status", out)
     assert (status.code, status.out.splitlines()[-1]) == (2, "to be run again: --array=1")
     succeed(*command(drive, out, "--block", 2, "--shard", "1/3"))
-    assert files(out) == files(tmp_path / "whole")
+    assert contents(out) == contents(tmp_path / "whole")
     assert "3 of 3 units done" in succeed("status", out).out
 
 
@@ -251,4 +244,4 @@ def test_scans_that_fail_are_left_out_of_a_whole_run_and_done_later(
     scan.write_bytes(content)
     succeed(*command(drive, out, "--block", 2))
     succeed(*command(drive, tmp_path / "whole"))
-    assert files(out) == files(tmp_path / "whole")
+    assert contents(out) == contents(tmp_path / "whole")

@@ -13,12 +13,13 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from contents import contents
 from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files import read_scan
 from derain.files.labels import read_labels
-from derain.jobs.job import FOLDER, job_status
+from derain.jobs.job import job_status
 from derain.jobs.shard import Shard
 from derain.jobs.workers import WorkerPool
 from derain.scan import Scan
@@ -39,14 +40,6 @@ TINY = Campaign(
     sensor=Sensor(rows=16, columns=100),
 )
 ONE = replace(TINY, train=1, validation=0, test=0, scans=1)
-
-
-def checksums(root: Path) -> dict[str, str]:
-    return {
-        file.relative_to(root).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
-        for file in sorted(root.rglob("*"))
-        if file.is_file() and FOLDER not in file.parts
-    }
 
 
 def times(root: Path) -> dict[Path, int]:
@@ -96,9 +89,10 @@ def test_scans_hold_labelled_returns_of_their_place_and_rain_by_the_rates(
 def test_the_manifest_describes_the_campaign_and_every_other_file_and_names_no_folder(
     track: Path,
 ) -> None:
-    manifest, there = read_manifest(track), checksums(track)
+    manifest, there = read_manifest(track), contents(track)
     del there["manifest.json"]
-    assert manifest == {**TINY.description, "keep": True, "files": there}
+    checksums = {name: hashlib.sha256(content).hexdigest() for name, content in there.items()}
+    assert manifest == {**TINY.description, "keep": True, "files": checksums}
     assert str(track.parent) not in json.dumps(manifest)
 
 
@@ -129,7 +123,7 @@ def test_a_run_that_failed_leaves_nothing_half_written_and_is_taken_up_by_any_wo
         shutil.rmtree(root / "sequences/002")  # and of one that is complete what is gone
         simulate_track(root, TINY, workers)
     assert times(root / "sequences/000") == kept
-    assert checksums(root) == checksums(track)
+    assert contents(root) == contents(track)
 
 
 def test_shards_make_the_same_data_set_and_the_last_completes_its_manifest(
@@ -139,7 +133,7 @@ def test_shards_make_the_same_data_set_and_the_last_completes_its_manifest(
     assert not simulate_track(root, TINY, shard=Shard(1, 2))
     assert "files" not in read_manifest(root)
     assert simulate_track(root, TINY, shard=Shard(0, 2))
-    assert checksums(root) == checksums(track)
+    assert contents(root) == contents(track)
 
 
 def test_a_data_set_that_is_there_is_not_made_twice_with_and_without_locks(

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from contents import contents
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_bags import small_bag
@@ -50,12 +51,6 @@ def drive(tmp_path: Path) -> Path:
     return tmp_path / "drives"
 
 
-def written(out: Path) -> dict[str, bytes]:
-    """What is in the files of a folder but for the records, by their paths."""
-    files = [path for path in out.rglob("*") if path.is_file() and ".derain" not in path.parts]
-    return {str(path.relative_to(out)): path.read_bytes() for path in files}
-
-
 METHODS = {
     "a filter": lambda: derain.FilterDerainer(derain.DROR()),
     "persistence": lambda: derain.PersistenceDerainer(),
@@ -75,8 +70,8 @@ def test_the_union_of_units_is_what_one_run_gives(
         )
         for name, each in (("whole", None), ("units", Division(block, keep_records=True)))
     ]
-    assert written(tmp_path / "whole") == written(tmp_path / "units")
-    assert len(written(tmp_path / "whole")) == 2 * (2 * SCANS - 1)
+    assert contents(tmp_path / "whole") == contents(tmp_path / "units")
+    assert len(contents(tmp_path / "whole")) == 2 * (2 * SCANS - 1)
     whole, units = ([scan.weather for scan in report.scans] for report in reports)
     assert whole == units
     assert [report.not_cleaned for report in reports] == [1, 1]
@@ -97,8 +92,8 @@ def test_shares_and_workers_give_the_same_and_a_last_run_finds_everything_done(
         derain.clean(
             source, method, tmp_path / "workers", most_removed=1, division=blocks, executor=pool
         )
-    assert written(tmp_path / "whole") == written(tmp_path / "shares")
-    assert written(tmp_path / "whole") == written(tmp_path / "workers")
+    assert contents(tmp_path / "whole") == contents(tmp_path / "shares")
+    assert contents(tmp_path / "whole") == contents(tmp_path / "workers")
     report = derain.clean(source, method, tmp_path / "shares", most_removed=1, division=blocks)
     assert report.before == len(report.scans) == 2 * SCANS - 1
 
@@ -172,7 +167,7 @@ def test_odometry_in_units_is_that_of_the_whole_source(drive: Path, tmp_path: Pa
             weather=every,
             division=division,
         )
-        assert written(tmp_path / "whole") == written(tmp_path / "units")
+        assert contents(tmp_path / "whole") == contents(tmp_path / "units")
         assert [scan.weather for scan in report.scans] == [scan.weather for scan in whole.scans]
     assert report.before == SCANS  # and not those of the recording of which a scan failed
     ungiven = Division(2, keep_records=True)
@@ -206,7 +201,7 @@ def test_bags_in_units_are_those_of_one_run(tmp_path: Path, storage: Storage) ->
     derain.clean(source, method, tmp_path / "whole", most_removed=1)
     with WorkerPool(1) as pool:
         derain.clean(source, method, tmp_path / "units", most_removed=1, executor=pool)
-    assert written(tmp_path / "whole") == written(tmp_path / "units")
+    assert contents(tmp_path / "whole") == contents(tmp_path / "units")
     report = derain.clean(
         source, method, tmp_path / "units", most_removed=1, division=Division(keep_records=True)
     )
