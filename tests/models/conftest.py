@@ -125,9 +125,10 @@ def make_trainer() -> Iterator[Callable[..., lightning.Trainer]]:
 Trained = TypeVar("Trained", bound=DerainingModule)
 
 
-def trained_on_scenes(model: Trained, labelled: Callable[[int], Scan]) -> Trained:
+def trained_on_scenes(make: Callable[[], Trained], labelled: Callable[[int], Scan]) -> Trained:
     """Trains a model on a few labelled scenes of WADS's classes."""
     lightning.seed_everything(0)
+    model = make()
     train, validation = [labelled(seed) for seed in range(4)], [labelled(9)]
     data = InMemory(train, validation, card="wads", loading=Loading(batch_size=2))
     trainer = lightning.Trainer(

@@ -40,7 +40,7 @@ def labelled(seed: int, drops: int = 300, gain: float = 1.0) -> Scan:
 @pytest.fixture(scope="module")
 def trained() -> CueFusion:
     """Trained on a few scenes."""
-    return trained_on_scenes(CueFusion(learning_rate=1e-2), labelled)
+    return trained_on_scenes(lambda: CueFusion(learning_rate=1e-2), labelled)
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +66,7 @@ def test_brightness_helps_whatever_its_unit(exported: Derainer) -> None:
     assert iou(alike) < iou(called) - 0.05
 
 
-@pytest.mark.parametrize("doubt", [0, 4, 8])
+@pytest.mark.parametrize("doubt", [-20, 20])
 def test_without_intensities_rain_is_the_likelier_the_more_of_it_there_is(
     trained: CueFusion, doubt: float
 ) -> None:
@@ -83,7 +83,7 @@ def test_without_intensities_rain_is_the_likelier_the_more_of_it_there_is(
     dark = replace(scan, intensity=None)
     usual = answer(dark, 0)
     rain = float(usual.sigmoid().sum()) / len(scan)
-    assert (rain > 0.01) == (doubt == 0)
+    assert (0 < rain < 0.01) == (doubt > 0)
     raised = torch.full_like(usual, 2 * min(rain / 0.01, 1))
     # Sums of many floats may differ from one call to the next, by how threads share them.
     torch.testing.assert_close(answer(dark, 2) - usual, raised, rtol=0, atol=1e-3)

@@ -125,7 +125,7 @@ def labelled(seed: int, drops: int = 300) -> Scan:
 @pytest.fixture(scope="module")
 def trained() -> RelativeOutDet:
     """Trained on a few scenes."""
-    return trained_on_scenes(RelativeOutDet(learning_rate=1e-2), labelled)
+    return trained_on_scenes(lambda: RelativeOutDet(learning_rate=1e-2), labelled)
 
 
 def test_it_learns_drops_and_is_blind_to_intensity(
