@@ -63,7 +63,7 @@ RunDerain = Callable[..., Outcome]
 
 
 @pytest.fixture
-def run_derain(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> RunDerain:
+def run_derain(capsys, monkeypatch) -> RunDerain:
     """Runs a command of derain in this process.
 
     `derain run` leaves no scan whole: of made-up scans, which are sparse, filters and random
@@ -83,7 +83,7 @@ def run_derain(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPat
 
 
 @pytest.fixture
-def saved_figures(monkeypatch: pytest.MonkeyPatch) -> "list[Figure]":
+def saved_figures(monkeypatch) -> "list[Figure]":
     """Every figure that was written to a file, in order."""
     from matplotlib.figure import Figure
 
@@ -99,7 +99,7 @@ def saved_figures(monkeypatch: pytest.MonkeyPatch) -> "list[Figure]":
 
 
 @pytest.fixture(scope="session")
-def made_once(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+def made_once(tmp_path_factory) -> Callable[..., Path]:
     """Makes a file by name once for all processes that share out the tests."""
     shared_out = "PYTEST_XDIST_WORKER" in os.environ
     own = tmp_path_factory.getbasetemp()
@@ -141,7 +141,7 @@ def random_outdet() -> "OutDet":
 
 
 @pytest.fixture(scope="session")
-def checkpoint(random_outdet: "OutDet", made_once: Callable[..., Path]) -> Path:
+def checkpoint(random_outdet, made_once) -> Path:
     """A checkpoint of that network."""
     from derain.models.checkpoint import save_model
 
@@ -149,7 +149,7 @@ def checkpoint(random_outdet: "OutDet", made_once: Callable[..., Path]) -> Path:
 
 
 @pytest.fixture(scope="session")
-def onnx_model(random_outdet: "OutDet", made_once: Callable[..., Path]) -> Path:
+def onnx_model(random_outdet, made_once) -> Path:
     """The same network, exported; in two blocks, which are traced several times as quickly."""
     from derain.export.onnx_file import export
 
@@ -165,7 +165,7 @@ def small_grid() -> dict[str, Any]:
 
 
 @pytest.fixture(scope="session")
-def random_salsanext(small_grid: dict[str, Any]) -> "SalsaNextModule":
+def random_salsanext(small_grid) -> "SalsaNextModule":
     """A narrow SalsaNext of random weights; it calls half of a scene rain."""
     from derain.models.salsanext import SalsaNext
 
@@ -173,7 +173,7 @@ def random_salsanext(small_grid: dict[str, Any]) -> "SalsaNextModule":
 
 
 @pytest.fixture(scope="session")
-def random_salsanext_lite(small_grid: dict[str, Any]) -> "SalsaNextModule":
+def random_salsanext_lite(small_grid) -> "SalsaNextModule":
     """The same of the variant that folds."""
     from derain.models.salsanext_lite import SalsaNextLite
 
@@ -202,7 +202,7 @@ def _random_segmenter(
 
 
 @pytest.fixture(scope="session")
-def random_lisnownet(small_grid: dict[str, Any]) -> "LiSnowNet":
+def random_lisnownet(small_grid) -> "LiSnowNet":
     """A narrow LiSnowNet of random weights, whose rule knows no limits; it finds rain."""
     import torch
 
@@ -229,13 +229,13 @@ def _randomise(network: "nn.Module", gain: float) -> None:
 
 
 @pytest.fixture(scope="session", params=["salsanext", "salsanext_lite", "lisnownet"])
-def image_model(request: pytest.FixtureRequest) -> "DerainingModule":
+def image_model(request) -> "DerainingModule":
     """Each of the networks on range images."""
     return request.getfixturevalue(f"random_{request.param}")
 
 
 @pytest.fixture(scope="session")
-def image_onnx(image_model: "DerainingModule", made_once: Callable[..., Path]) -> Path:
+def image_onnx(image_model, made_once) -> Path:
     """The same network, exported."""
     from derain.export.onnx_file import export
 
@@ -243,7 +243,7 @@ def image_onnx(image_model: "DerainingModule", made_once: Callable[..., Path]) -
 
 
 @pytest.fixture(scope="session")
-def salsanext_onnx(random_salsanext: "SalsaNextModule", made_once: Callable[..., Path]) -> Path:
+def salsanext_onnx(random_salsanext, made_once) -> Path:
     """One of them, for what does not depend on the network."""
     from derain.export.onnx_file import export
 
@@ -251,19 +251,19 @@ def salsanext_onnx(random_salsanext: "SalsaNextModule", made_once: Callable[...,
 
 
 @pytest.fixture
-def one_block(monkeypatch: pytest.MonkeyPatch) -> None:
+def one_block(monkeypatch) -> None:
     """Exports 3D-OutDet in one block: the same network, traced several times as quickly."""
     monkeypatch.setattr("derain.models.outdet.network.BLOCKS", 1)
 
 
 @pytest.fixture
-def two_sizes(monkeypatch: pytest.MonkeyPatch) -> None:
+def two_sizes(monkeypatch) -> None:
     """Halves images once in LiSnowNet: a network of two stages, traced in a third of the time."""
     monkeypatch.setattr("derain.models.lisnownet.network.HALVINGS", 1)
 
 
 @pytest.fixture
-def saying(onnx_model: Path, tmp_path: Path) -> Callable[[dict[str, Any]], Path]:
+def saying(onnx_model, tmp_path) -> Callable[[dict[str, Any]], Path]:
     """Makes a copy of the exported network that says something else of itself."""
     import onnx
 

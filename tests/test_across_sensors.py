@@ -50,7 +50,7 @@ def write_scan(path: Path, label: np.ndarray | None, seed: int) -> Scan:
 
 
 @pytest.fixture
-def shared(tmp_path: Path) -> Path:
+def shared(tmp_path) -> Path:
     """Scans of 300 points: with thirty drops, with ten pedestrians' points, without labels."""
     card = tmp_path / "card.yaml"
     card.write_text(CARD)
@@ -66,9 +66,7 @@ def shared(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def written(
-    shared: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> tuple[dict, str]:
+def written(shared, monkeypatch, capsys) -> tuple[dict, str]:
     """The table as JSON and as text."""
     words = ["--plan", shared / "plan.yaml", "--shared", shared, "--work", shared / "work"]
     words += ["--out", shared / "table", "--times", 0, "--threads", 1]
@@ -85,7 +83,7 @@ def values(content: dict, title: str) -> dict[str, float]:
     return {method: cell["value"] for method, cell in column["cells"].items()}
 
 
-def test_its_figures_are_those_of_counting_by_hand(written: tuple[dict, str], shared: Path) -> None:
+def test_its_figures_are_those_of_counting_by_hand(written, shared) -> None:
     content, _ = written
     dror = FilterDerainer(DROR(), 1)
     wet = [Scan.of(scene(300, seed=seed)) for seed in range(2)]
@@ -107,14 +105,14 @@ def test_its_figures_are_those_of_counting_by_hand(written: tuple[dict, str], sh
     assert values(content, "roof") == values(content, "worst of the clean scans") == clean
 
 
-def test_some_of_the_data_can_be_measured_alone(shared: Path) -> None:
+def test_some_of_the_data_can_be_measured_alone(shared) -> None:
     plan = Plan.of_yaml(shared / "plan.yaml").with_data(["dry"])
     measurement = Measurement(plan, shared, shared / "work", threads=1)
     titles = [column.title for column in measurement.columns()]
     assert titles == ["dry: all", "dry: pedestrian", "dry: rain", "file"]
 
 
-def test_it_says_what_it_leaves_out_and_why(written: tuple[dict, str]) -> None:
+def test_it_says_what_it_leaves_out_and_why(written) -> None:
     content, text = written
     assert list(content["methods"]) == ["nothing", "DROR", "everything", "places"]
     assert content["methods"]["DROR"] == {"parameters": DROR().as_dict()}
@@ -126,7 +124,7 @@ def test_it_says_what_it_leaves_out_and_why(written: tuple[dict, str]) -> None:
     assert "places" not in values(content, "theirs")
 
 
-def test_what_a_method_scores_where_it_was_trained_is_marked(written: tuple[dict, str]) -> None:
+def test_what_a_method_scores_where_it_was_trained_is_marked(written) -> None:
     content, _ = written
     for column in content["columns"]:
         learnt = {method for method, cell in column["cells"].items() if cell["learnt"]}

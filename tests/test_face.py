@@ -35,7 +35,7 @@ NAMES = {"derain": derain, "np": np, "torch": torch, "Trainer": Trainer}
 
 
 @pytest.fixture
-def examples_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def examples_folder(tmp_path, monkeypatch) -> Iterator[Path]:
     """A folder with what examples read, in which they run, on random numbers of their own."""
     prepare(tmp_path)
     monkeypatch.chdir(tmp_path)
@@ -93,7 +93,7 @@ def test_no_name_is_that_of_a_module_which_would_take_its_place_once_loaded() ->
 
 
 @pytest.mark.parametrize("name", OFFERED)
-def test_a_name_gives_what_it_is_called_by_and_is_found_without_asking_again(name: str) -> None:
+def test_a_name_gives_what_it_is_called_by_and_is_found_without_asking_again(name) -> None:
     value = getattr(derain, name)
     assert value.__name__ == name
     assert vars(derain)[name] is value
@@ -133,7 +133,7 @@ def test_help_shows_every_name_and_what_it_is() -> None:
 
 @pytest.mark.usefixtures("examples_folder")
 @pytest.mark.parametrize("name", OFFERED)
-def test_every_name_has_an_example_which_is_true(name: str) -> None:
+def test_every_name_has_an_example_which_is_true(name) -> None:
     documented = getattr(derain, name)
     own_names = vars(sys.modules[documented.__module__])
     tests = doctest.DocTestFinder().find(documented, name, globs={**own_names, **NAMES})

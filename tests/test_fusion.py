@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -38,9 +37,7 @@ def radar_frame(points: int = 30, seed: int = 1) -> Scan:
 
 
 @given(st.lists(quarters, max_size=12), st.lists(quarters, max_size=12), quarters.map(abs))
-def test_pairs_in_time_are_those_that_brute_force_finds(
-    times: list[float], among: list[float], within: float
-) -> None:
+def test_pairs_in_time_are_those_that_brute_force_finds(times, among, within) -> None:
     expected = []
     for time in times:
         # The nearest; of equally near ones the earlier; of equal ones the first.
@@ -86,14 +83,14 @@ def test_rows_that_cannot_be_judged_stay_as_they_are() -> None:
     assert fused.valid[5:].tolist() == [False, False, False, True]
 
 
-def test_a_fused_file_has_the_columns_of_rehearse_3d(tmp_path: Path) -> None:
+def test_a_fused_file_has_the_columns_of_rehearse_3d(tmp_path) -> None:
     fused = fuse(Scan.of(scene(50)), radar_frame(), PLACE)
     write_scan(tmp_path / "fused.bin", fused)
     table = np.fromfile(tmp_path / "fused.bin", "<f4").reshape(-1, 4)
     np.testing.assert_array_equal(table, np.c_[fused.xyz, fused.intensity])
 
 
-def test_a_file_with_channels_names_them_and_tells_the_sensors_apart(tmp_path: Path) -> None:
+def test_a_file_with_channels_names_them_and_tells_the_sensors_apart(tmp_path) -> None:
     lidar, radar = Scan.of(scene(50)), radar_frame()
     fused = fuse(lidar, radar, PLACE, channels=["rcs", "doppler"])
     write_scan(tmp_path / "fused.npz", fused)
@@ -121,13 +118,13 @@ def test_a_channel_that_the_radar_lacks_is_named() -> None:
 
 
 @pytest.mark.parametrize("channel", ["x", "intensity", "radar"])
-def test_a_channel_does_not_take_the_place_of_a_merged_column(channel: str) -> None:
+def test_a_channel_does_not_take_the_place_of_a_merged_column(channel) -> None:
     with pytest.raises(InputError, match=f"{channel}: is a column of the merged cloud itself"):
         fuse(Scan.of(scene(5)), radar_frame(), PLACE, channels=["rcs", channel])
 
 
 @pytest.mark.parametrize(("name", "scan"), list(hard_cases(2000)))
-def test_every_hard_case_is_fused_from_either_side(name: str, scan: Scan) -> None:
+def test_every_hard_case_is_fused_from_either_side(name, scan) -> None:
     ordinary = radar_frame()
     labelled = scan.with_label(np.zeros(len(scan), np.int64))
     for lidar, radar in ((labelled, ordinary), (Scan.of(scene(20)), scan)):
@@ -141,9 +138,7 @@ def labelled(xyz: object, label: object) -> Scan:
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 40), st.integers(0, 40), st.floats(0.01, 5))
-def test_labels_are_those_that_brute_force_finds(
-    seed: int, sources: int, queries: int, within: float
-) -> None:
+def test_labels_are_those_that_brute_force_finds(seed, sources, queries, within) -> None:
     random = np.random.default_rng(seed)
     # On a coarse lattice, off which the queries lie: many duplicates, no other ties.
     scan = labelled(random.integers(1, 4, (sources, 3)), np.arange(sources))

@@ -1,7 +1,6 @@
 """Every reader survives damaged files; the fuzzer sees what does not."""
 
 import shutil
-from pathlib import Path
 
 import pytest
 from broken_readers import readers
@@ -14,7 +13,7 @@ from derain.files.format import FORMATS
 
 
 def test_every_reader_reads_refuses_and_never_breaks(
-    onnx_model: Path, checkpoint: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    onnx_model, checkpoint, tmp_path, capsys
 ) -> None:
     models = tmp_path / "models"
     models.mkdir()
@@ -36,7 +35,7 @@ def test_every_reader_reads_refuses_and_never_breaks(
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_every_format_has_hostile_and_sound_files_in_the_fuzzer(suffix: str) -> None:
+def test_every_format_has_hostile_and_sound_files_in_the_fuzzer(suffix) -> None:
     assert suffix in INPUTS, f"add {suffix} to benchmarks/fuzzing/formats.py"
     extra = FORMATS[suffix].EXTRA
     if extra is not None and not extra.installed:
@@ -59,9 +58,7 @@ def test_every_format_has_hostile_and_sound_files_in_the_fuzzer(suffix: str) -> 
         ("refuses", "refused, though nothing is wrong with it"),
     ],
 )
-def test_whatever_is_wrong_with_a_reader_is_found(
-    worker: Worker, reader: str, found: str | None
-) -> None:
+def test_whatever_is_wrong_with_a_reader_is_found(worker, reader, found) -> None:
     whole, damaged = worker.judge(reader, range(2))
     assert (whole.number, damaged.number) == (0, 1)
     if reader == "refuses":
@@ -72,7 +69,7 @@ def test_whatever_is_wrong_with_a_reader_is_found(
 
 
 @pytest.fixture(scope="module")
-def worker(tmp_path_factory: pytest.TempPathFactory) -> Worker:
+def worker(tmp_path_factory) -> Worker:
     """Judges the readers that are broken."""
     made = Worker(0, tmp_path_factory.mktemp("worker"), readers)
     yield made

@@ -72,7 +72,7 @@ def loaded_by(code: str, *arguments: str | Path) -> set[str]:
 
 
 @pytest.fixture
-def scan(tmp_path: Path) -> Path:
+def scan(tmp_path) -> Path:
     path = tmp_path / "scan.bin"
     scene(100).tofile(path)
     return path
@@ -88,7 +88,7 @@ def scan(tmp_path: Path) -> Path:
         ("Derainer", {"derain", "numpy", "yaml"}),
     ],
 )
-def test_a_name_of_the_package_loads_what_it_needs(used: str, loaded: set[str]) -> None:
+def test_a_name_of_the_package_loads_what_it_needs(used, loaded) -> None:
     found = loaded_by(f"import derain; derain.{used}")
     assert not found & HEAVY
     of_yaml = {name for name in found if "cython" in name}
@@ -96,7 +96,7 @@ def test_a_name_of_the_package_loads_what_it_needs(used: str, loaded: set[str]) 
 
 
 def test_the_runtime_needs_what_reads_files_and_a_model_onnxruntime_and_the_knn_library(
-    onnx_model: Path,
+    onnx_model,
 ) -> None:
     runtime = {"derain", "numpy", "yaml"}
     code = "from derain.export.runtime import Derainer"
@@ -110,12 +110,12 @@ def test_the_runtime_needs_what_reads_files_and_a_model_onnxruntime_and_the_knn_
 
 
 @pytest.mark.parametrize("option", ["--help", "--version"])
-def test_a_start_without_a_command_loads_no_library(option: str) -> None:
+def test_a_start_without_a_command_loads_no_library(option) -> None:
     assert loaded_by(COMMAND, option) == {"derain"}
 
 
 def test_what_a_small_computer_runs_loads_nothing_heavy(
-    scan: Path, onnx_model: Path, salsanext_onnx: Path, tmp_path: Path
+    scan, onnx_model, salsanext_onnx, tmp_path
 ) -> None:
     methods, out = (str(onnx_model), str(salsanext_onnx), "dror"), tmp_path / "out"
     commands = [
@@ -136,7 +136,7 @@ def test_help_loads_nothing_heavy() -> None:
 
 
 def test_a_picture_loads_no_more_than_the_drawing_and_the_method_need(
-    scan: Path, onnx_model: Path, tmp_path: Path
+    scan, onnx_model, tmp_path
 ) -> None:
     write_labels(scan.with_suffix(".label"), np.repeat([0, 110], 50))
     methods = ["--methods", onnx_model, "dror", "all", "--card", "wads"]

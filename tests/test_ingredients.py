@@ -35,7 +35,7 @@ done
 
 
 @pytest.fixture
-def calls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def calls(tmp_path, monkeypatch) -> Path:
     """A file that tells how derain was called."""
     stand_in, calls = tmp_path / "derain", tmp_path / "calls.txt"
     stand_in.write_text(STAND_IN.format(calls=calls))
@@ -45,12 +45,12 @@ def calls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def asked(tmp_path: Path) -> Sweep:
+def asked(tmp_path) -> Sweep:
     (tmp_path / "plan.yaml").write_text(PLAN)
     return Sweep.of_yaml(tmp_path / "plan.yaml", tmp_path / "models")
 
 
-def test_variants_are_trained_alike_on_the_data_that_they_name(asked: Sweep) -> None:
+def test_variants_are_trained_alike_on_the_data_that_they_name(asked) -> None:
     alone, network, _ = asked.variants
     made, fit, export = asked.commands(alone)
     folder = asked.folder / "range_alone"
@@ -68,7 +68,7 @@ def test_variants_are_trained_alike_on_the_data_that_they_name(asked: Sweep) -> 
 
 
 @pytest.mark.parametrize("titles", [("a b", "a, b"), ("?", "a")])
-def test_no_variant_takes_the_folder_of_another(titles: tuple[str, str], tmp_path: Path) -> None:
+def test_no_variant_takes_the_folder_of_another(titles, tmp_path) -> None:
     lines = [f'  "{title}": --config mine.yaml' for title in titles]
     text = "\n".join(["seed: 0", "epochs: 1", "variants:", *lines])
     (tmp_path / "plan.yaml").write_text(text)
@@ -76,7 +76,7 @@ def test_no_variant_takes_the_folder_of_another(titles: tuple[str, str], tmp_pat
         Sweep.of_yaml(tmp_path / "plan.yaml", tmp_path)
 
 
-def test_a_row_for_each_threshold(asked: Sweep) -> None:
+def test_a_row_for_each_threshold(asked) -> None:
     alone, network, _ = asked.variants
     assert dict(alone.rows()) == {
         "range alone, at 0.25": {"threshold": 0.25},
@@ -86,7 +86,7 @@ def test_a_row_for_each_threshold(asked: Sweep) -> None:
     assert network.folder == "another_network_for_short"
 
 
-def test_a_model_that_is_there_is_not_trained_again(asked: Sweep, calls: Path) -> None:
+def test_a_model_that_is_there_is_not_trained_again(asked, calls) -> None:
     alone = asked.variants[0]
     assert asked.train(alone) is None
     first = calls.read_text()
@@ -95,7 +95,7 @@ def test_a_model_that_is_there_is_not_trained_again(asked: Sweep, calls: Path) -
     assert calls.read_text() == first
 
 
-def test_a_variant_that_changed_or_was_stopped_is_trained_anew(asked: Sweep, calls: Path) -> None:
+def test_a_variant_that_changed_or_was_stopped_is_trained_anew(asked, calls) -> None:
     alone = asked.variants[0]
     asked.train(alone)
     asked.train(Variant(alone.title, alone.fit.replace("range", "z")))
@@ -105,7 +105,7 @@ def test_a_variant_that_changed_or_was_stopped_is_trained_anew(asked: Sweep, cal
     assert len(calls.read_text().splitlines()) == 9
 
 
-def test_a_variant_that_fails_says_where_to_look(asked: Sweep, calls: Path) -> None:
+def test_a_variant_that_fails_says_where_to_look(asked, calls) -> None:
     broken = asked.variants[2]
     reason = asked.train(broken)
     assert reason is not None

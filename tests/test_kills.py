@@ -17,16 +17,14 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="it looks for pr
 
 
 @pytest.fixture
-def kills(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+def kills(monkeypatch) -> ModuleType:
     monkeypatch.syspath_prepend(REPOSITORY)
     import benchmarks.kills
 
     return benchmarks.kills
 
 
-def test_a_killed_command_leaves_whole_files_and_can_be_run_again(
-    kills: ModuleType, tmp_path: Path
-) -> None:
+def test_a_killed_command_leaves_whole_files_and_can_be_run_again(kills, tmp_path) -> None:
     inputs = kills.SmallInputs(tmp_path / "inputs")
     victim = kills.undisturbed(kills.COMMANDS["fuse"](inputs), tmp_path / "undisturbed")
     generator = random.Random(0)
@@ -37,7 +35,7 @@ def test_a_killed_command_leaves_whole_files_and_can_be_run_again(
 
 
 @pytest.fixture
-def victim(kills: ModuleType, tmp_path: Path) -> object:
+def victim(kills, tmp_path) -> object:
     """A command that has written a file of each kind, undisturbed."""
     out = tmp_path / "undisturbed" / "out"
     out.mkdir(parents=True)
@@ -58,9 +56,7 @@ def victim(kills: ModuleType, tmp_path: Path) -> object:
         *(("table.md", 4), ("picture.png", 1000)),
     ],
 )
-def test_a_file_that_is_cut_short_is_found(
-    kills: ModuleType, victim: object, tmp_path: Path, name: str, left: int
-) -> None:
+def test_a_file_that_is_cut_short_is_found(kills, victim, tmp_path, name, left) -> None:
     shutil.copytree(tmp_path / "undisturbed", tmp_path / "kill")
     assert kills.half_written(victim, tmp_path / "kill", complete=True) == []
     file = tmp_path / "kill/out" / name
@@ -72,9 +68,7 @@ def test_a_file_that_is_cut_short_is_found(
     assert kills.half_written(victim, tmp_path / "kill", complete=True) == [f"{name} is missing"]
 
 
-def test_what_is_left_lying_about_or_running_is_found(
-    kills: ModuleType, victim: object, tmp_path: Path
-) -> None:
+def test_what_is_left_lying_about_or_running_is_found(kills, victim, tmp_path) -> None:
     shutil.copytree(tmp_path / "undisturbed", tmp_path / "kill")
     assert kills.temporary_files(victim, tmp_path / "kill") == []
     (tmp_path / "kill/out/.derain-0.bin").touch()

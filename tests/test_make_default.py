@@ -23,7 +23,7 @@ THRESHOLDS = (0.3, 0.4, 0.5, 0.6)
 
 
 @pytest.fixture
-def calls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def calls(tmp_path, monkeypatch) -> Path:
     """A file that tells how derain was called."""
     stand_in, calls = tmp_path / "derain", tmp_path / "calls.txt"
     stand_in.write_text(STAND_IN.format(calls=calls, broken=tmp_path / "broken.txt"))
@@ -32,7 +32,7 @@ def calls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return calls
 
 
-def test_a_training_that_ended_is_not_begun_again(calls: Path, tmp_path: Path) -> None:
+def test_a_training_that_ended_is_not_begun_again(calls, tmp_path) -> None:
     training = tmp_path / "seed_7" / "training"
     checkpoint = trained(tmp_path, training, 7)
     called = calls.read_text()
@@ -42,7 +42,7 @@ def test_a_training_that_ended_is_not_begun_again(calls: Path, tmp_path: Path) -
     assert calls.read_text() == called
 
 
-def test_a_training_that_did_not_end_is_begun_anew(calls: Path, tmp_path: Path) -> None:
+def test_a_training_that_did_not_end_is_begun_anew(calls, tmp_path) -> None:
     training = tmp_path / "training"
     (tmp_path / "broken.txt").touch()
     with pytest.raises(InputError, match="derain fit failed"):
@@ -63,9 +63,7 @@ def by_threshold(values: st.SearchStrategy[float]) -> st.SearchStrategy[dict[flo
 
 
 @given(by_threshold(ious), st.dictionaries(st.sampled_from("abc"), by_threshold(shares)))
-def test_a_threshold_is_raised_as_far_as_clean_scans_ask_and_it_may(
-    iou: dict[float, float], taken: dict[str, dict[float, float]]
-) -> None:
+def test_a_threshold_is_raised_as_far_as_clean_scans_ask_and_it_may(iou, taken) -> None:
     best, threshold = chosen(iou, {}), chosen(iou, taken)
     assert iou[best] == max(iou.values())
     assert threshold >= best

@@ -4,14 +4,12 @@ import math
 import warnings
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
-from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases
@@ -56,7 +54,7 @@ def can_be_judged(point: list[float], intensity: float | None) -> bool:
 
 
 @given(rows_of_four)
-def test_valid_is_what_a_look_at_each_row_says(points: NDArray[np.float32]) -> None:
+def test_valid_is_what_a_look_at_each_row_says(points) -> None:
     rows = points.tolist()
     # Where not one intensity is a number, the column tells nothing of any point.
     known = any(abs(row[3]) <= 1e7 for row in rows)
@@ -75,7 +73,7 @@ def test_valid_is_what_a_look_at_each_row_says(points: NDArray[np.float32]) -> N
     st.sampled_from([0, 1, FEWEST_ALIKE - 1, FEWEST_ALIKE]),
 )
 def test_intensity_was_measured_where_it_differs_or_the_points_are_few(
-    values: list[float], points: int, blank: int
+    values, points, blank
 ) -> None:
     xyz = np.ones((points, 3), np.float32)
     xyz[:blank] = np.nan
@@ -104,7 +102,7 @@ def test_intensities_of_another_unit_leave_the_columns_of_the_file() -> None:
 
 
 @given(rows_of_four)
-def test_range_is_the_distance_from_the_sensor(points: NDArray[np.float32]) -> None:
+def test_range_is_the_distance_from_the_sensor(points) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         distance = Scan.of(points).range
@@ -114,7 +112,7 @@ def test_range_is_the_distance_from_the_sensor(points: NDArray[np.float32]) -> N
 
 
 @pytest.mark.parametrize("scan", HARD_CASES.values(), ids=HARD_CASES)
-def test_a_hard_scan_has_a_finite_range_and_intensity_wherever_it_is_valid(scan: Scan) -> None:
+def test_a_hard_scan_has_a_finite_range_and_intensity_wherever_it_is_valid(scan) -> None:
     assert scan.valid.shape == scan.range.shape == (len(scan),)
     assert np.isfinite(scan.range[scan.valid]).all()
     assert scan.intensity is None or np.isfinite(scan.intensity[scan.valid]).all()
@@ -132,7 +130,7 @@ def test_an_array_becomes_a_scan_of_its_first_four_columns() -> None:
 
 
 @pytest.mark.parametrize("shape", [(0,), (4,), (5, 2), (2, 4, 4), (), (4, 100)])
-def test_an_array_that_is_not_rows_of_points_is_refused(shape: tuple[int, ...]) -> None:
+def test_an_array_that_is_not_rows_of_points_is_refused(shape) -> None:
     with pytest.raises(InputError, match=r"mine: points have shape .*\. Give an array"):
         Scan.of(np.zeros(shape), name="mine")
 
@@ -169,7 +167,7 @@ def test_every_array_that_a_scan_is_given_is_copied() -> None:
 
 
 @pytest.mark.parametrize("dtype", [np.uint32, np.uint16, np.int32, np.uint8, float])
-def test_class_ids_of_any_dtype_are_taken_without_the_instances_of_label_files(dtype: type) -> None:
+def test_class_ids_of_any_dtype_are_taken_without_the_instances_of_label_files(dtype) -> None:
     instance = 7 << 16 if dtype is np.uint32 else 0
     scan = Scan.of(np.ones((2, 3)))
     label = scan.with_label(np.array([40, instance + 110], dtype)).label
@@ -179,13 +177,13 @@ def test_class_ids_of_any_dtype_are_taken_without_the_instances_of_label_files(d
 
 
 @pytest.mark.parametrize("label", [[0.5, 1], [math.nan, 1], ["snow", "rain"]])
-def test_class_ids_that_are_not_whole_numbers_are_refused(label: list[Any]) -> None:
+def test_class_ids_that_are_not_whole_numbers_are_refused(label) -> None:
     with pytest.raises(InputError, match="array: label"):
         Scan.of(np.ones((2, 3))).with_label(np.array(label))
 
 
 @pytest.mark.parametrize("column", ["intensity", "label", "radar", "fields"])
-def test_a_column_of_another_shape_is_refused(column: str) -> None:
+def test_a_column_of_another_shape_is_refused(column) -> None:
     short = np.zeros(2)
     columns = {column: {"ring": short} if column == "fields" else short}
     title = "ring" if column == "fields" else column
@@ -199,7 +197,7 @@ def test_a_column_of_another_shape_is_refused(column: str) -> None:
 
 
 @given(st.lists(st.integers(0, 5)))
-def test_taking_rows_takes_them_of_every_column(rows: list[int]) -> None:
+def test_taking_rows_takes_them_of_every_column(rows) -> None:
     scan, taken = full_scan(), full_scan().take(np.array(rows, dtype=np.int64))
     assert len(taken) == len(rows)
     for name in ("xyz", "intensity", "label", "radar"):
@@ -247,5 +245,5 @@ def test_what_no_sensor_measures_is_missing_from_a_column() -> None:
 @pytest.mark.parametrize(
     "column", [np.zeros((6, 3)), np.array(list("abcdef")), np.zeros(6, complex)], ids=str
 )
-def test_a_column_that_is_not_one_number_a_point_is_no_channel(column: NDArray[Any]) -> None:
+def test_a_column_that_is_not_one_number_a_point_is_no_channel(column) -> None:
     assert Scan(np.ones((6, 3), np.float32), fields={"other": column}).channel("other") is None

@@ -64,12 +64,12 @@ specs = st.builds(
 
 
 @given(specs)
-def test_a_spec_survives_json(spec: Spec) -> None:
+def test_a_spec_survives_json(spec) -> None:
     assert Spec.from_dict(json.loads(json.dumps(spec.as_dict())), "model") == spec
 
 
 @pytest.mark.parametrize("schema", [SCHEMA + 1, 10**400], ids=["next", "far"])
-def test_a_newer_schema_asks_for_an_upgrade(schema: int) -> None:
+def test_a_newer_schema_asks_for_an_upgrade(schema) -> None:
     newer = {"schema": schema, "everything": "else may differ"}
     with pytest.raises(InputError, match=r"m\.onnx: its Spec: schema .* newer .* Upgrade derain"):
         Spec.from_dict(newer, "m.onnx")
@@ -79,7 +79,7 @@ DEFAULTS = {"rule": {}, "threshold": 0.5, "candidates": None, "training": {}, "s
 
 
 @pytest.mark.parametrize("name", SPEC.as_dict())
-def test_what_has_a_default_may_be_missing_and_nothing_else(name: str) -> None:
+def test_what_has_a_default_may_be_missing_and_nothing_else(name) -> None:
     content = SPEC.as_dict()
     del content[name]
     if name in DEFAULTS:
@@ -137,9 +137,7 @@ NAN, HUGE = float("nan"), 10**400
     ],
     ids=str,
 )
-def test_a_value_that_cannot_be_is_refused_where_it_stands(
-    change: dict[str, Any], reason: str
-) -> None:
+def test_a_value_that_cannot_be_is_refused_where_it_stands(change, reason) -> None:
     with pytest.raises(
         InputError, match=rf"m\.onnx: (its Spec|back_projection): .*{reason}"
     ) as refusal:
@@ -151,13 +149,13 @@ def test_a_value_that_cannot_be_is_refused_where_it_stands(
 
 
 @pytest.mark.parametrize("content", [None, [], "Spec", {1: 2}], ids=str)
-def test_what_is_no_mapping_is_no_spec(content: Any) -> None:
+def test_what_is_no_mapping_is_no_spec(content) -> None:
     with pytest.raises(InputError, match=r"m\.onnx: its Spec: "):
         Spec.from_dict(content, "m.onnx")
 
 
 @pytest.mark.parametrize("way_back", BACK_PROJECTIONS)
-def test_a_range_view_survives_json_with_its_grid_and_way_back(way_back: str) -> None:
+def test_a_range_view_survives_json_with_its_grid_and_way_back(way_back) -> None:
     spec = of_range_view(way_back=way_back)
     read = Spec.from_dict(json.loads(json.dumps(spec.as_dict())), "model")
     assert read == spec

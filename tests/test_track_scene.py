@@ -27,7 +27,7 @@ def track() -> Track:
     return lay_out_facility(np.random.default_rng(1))
 
 
-def test_labels_agree_with_the_truth_where_rain_is_looked_for(track: Track) -> None:
+def test_labels_agree_with_the_truth_where_rain_is_looked_for(track) -> None:
     scene = scene_of_track(track, SENSOR, beside=10)
     generator = np.random.default_rng(0)
     falling = rain_on_beams(
@@ -42,7 +42,7 @@ def test_labels_agree_with_the_truth_where_rain_is_looked_for(track: Track) -> N
     assert (rain & called).sum() / (rain | called).sum() > 0.95
 
 
-def test_every_thing_of_the_track_is_in_boxes_of_its_class(track: Track) -> None:
+def test_every_thing_of_the_track_is_in_boxes_of_its_class(track) -> None:
     scene = scene_of_track(track, SENSOR)
     assert scene.rain_area is None  # without ground beside the road
     for kind in (TrackClass.CAR, TrackClass.SPRINKLER, TrackClass.BIKE, TrackClass.TARGET):
@@ -88,9 +88,7 @@ rectangles = st.builds(
 
 
 @given(rectangles)
-def test_the_tightest_rectangle_around_corners_is_the_one_they_are_of(
-    rectangle: Rectangle,
-) -> None:
+def test_the_tightest_rectangle_around_corners_is_the_one_they_are_of(rectangle) -> None:
     found = rectangle_around(rectangle.corners())
     assert sorted(found.size) == pytest.approx(sorted(rectangle.size), abs=5e-3)
     assert found.centre == pytest.approx(rectangle.centre, abs=5e-3)

@@ -1,7 +1,6 @@
 """The manifest of taught labels: what is written is read, and nothing damaged is."""
 
 import os
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -33,7 +32,7 @@ CONTENT = {
 }
 
 
-def test_what_is_written_is_read(tmp_path: Path) -> None:
+def test_what_is_written_is_read(tmp_path) -> None:
     scans = [
         TaughtScan("drive/00", tmp_path / "drive/00.bin", "drive", 0, "train"),
         TaughtScan("drive/01", tmp_path / "drive/ä 01.bin.gz", "010", 12, "validation"),
@@ -55,7 +54,7 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
     assert frame.intensity_scale == 255.0
 
 
-def test_labels_and_scans_move_together_and_are_found_through_a_link(tmp_path: Path) -> None:
+def test_labels_and_scans_move_together_and_are_found_through_a_link(tmp_path) -> None:
     root = tmp_path / "here/a/taught"
     root.mkdir(parents=True)
     os.symlink(root, tmp_path / "link")
@@ -92,7 +91,7 @@ def of_scan(**values: Any) -> dict[str, Any]:
         ({"made_by": "derain.teaching"}, "teacher is missing"),
     ],
 )
-def test_what_is_damaged_is_one_error(tmp_path: Path, content: object, reason: str) -> None:
+def test_what_is_damaged_is_one_error(tmp_path, content, reason) -> None:
     file = tmp_path / TAUGHT_MANIFEST
     file.write_text(yaml.safe_dump(CONTENT))
     (sound,) = Manifest.read(tmp_path).scans
@@ -104,7 +103,7 @@ def test_what_is_damaged_is_one_error(tmp_path: Path, content: object, reason: s
     assert reason in str(raised.value)
 
 
-def test_a_folder_without_a_manifest_is_refused(tmp_path: Path) -> None:
+def test_a_folder_without_a_manifest_is_refused(tmp_path) -> None:
     with pytest.raises(InputError, match=r"has no taught\.yaml"):
         Manifest.read(tmp_path)
 

@@ -26,9 +26,7 @@ rectangles = st.builds(
 
 
 @given(rectangles, st.integers(0, 2**32 - 1))
-def test_a_point_is_inside_where_combining_the_sides_leads_to_it(
-    rectangle: Rectangle, seed: int
-) -> None:
+def test_a_point_is_inside_where_combining_the_sides_leads_to_it(rectangle, seed) -> None:
     shares = np.random.default_rng(seed).uniform(-1, 1, (50, 2))
     shares = shares[np.abs(np.abs(shares) - 0.5).min(axis=1) > 1e-6]
     first, second, _, fourth = rectangle.corners()
@@ -89,7 +87,7 @@ def read(folder: Path, text: str) -> Scene:
     return read_scene(path)
 
 
-def test_every_key_of_a_scene_is_read_and_the_road_is_all_that_it_needs(tmp_path: Path) -> None:
+def test_every_key_of_a_scene_is_read_and_the_road_is_all_that_it_needs(tmp_path) -> None:
     assert read(tmp_path, TEXT) == SCENE
     assert read(tmp_path, ROAD) == Scene(((0, 0), (1, 0), (0, 1)))
     assert module.__doc__ is not None
@@ -123,9 +121,7 @@ def test_corrections_hold_in_their_sequence_and_change_what_they_state_alone() -
         (ROAD + "corrections: {a: {boxes: {b: {}}}}", "corrections.a.boxes.b", "no such box"),
     ],
 )
-def test_what_cannot_be_meant_is_named_by_its_key(
-    tmp_path: Path, text: str, key: str, reason: str
-) -> None:
+def test_what_cannot_be_meant_is_named_by_its_key(tmp_path, text, key, reason) -> None:
     with pytest.raises(InputError) as raised:
         read(tmp_path, text)
     path = tmp_path / "scene.yaml"

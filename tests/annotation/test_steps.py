@@ -107,9 +107,7 @@ def label_of(*point: float, scene: Scene = SCENE) -> int:
         (WIDER, (30, 0, 0), TrackClass.ROAD),
     ],
 )
-def test_a_point_gets_its_class_from_where_it_lies(
-    scene: Scene, point: tuple[float, float, float], expected: int
-) -> None:
+def test_a_point_gets_its_class_from_where_it_lies(scene, point, expected) -> None:
     assert label_of(*point, scene=scene) == expected
 
 

@@ -29,7 +29,7 @@ MakeDrive = Callable[..., Path]
 
 
 @pytest.fixture
-def make_drive(tmp_path: Path) -> MakeDrive:
+def make_drive(tmp_path) -> MakeDrive:
     """Writes a recording of some scans, and labels of WADS if asked: every tenth point is snow."""
 
     def make(name: str = "drive", scans: int = 6, labelled: bool = False) -> Path:
@@ -60,9 +60,7 @@ def test_labels_say_rain_not_rain_and_not_known() -> None:
 
 
 @pytest.mark.parametrize("make", [Between, lambda: FilterDerainer(DROR(), 1)])
-def test_labels_are_what_the_method_says(
-    make: Callable[[], Between | FilterDerainer], make_drive: MakeDrive, tmp_path: Path
-) -> None:
+def test_labels_are_what_the_method_says(make, make_drive, tmp_path) -> None:
     drive, out = make_drive(), tmp_path / "taught"
     manifest = teach(make(), of(drive), out)
     keys = [scan.key for scan in manifest.scans]
@@ -80,7 +78,7 @@ def test_labels_are_what_the_method_says(
     assert {*contents(out)} == {CARD, TAUGHT_MANIFEST, *(f"{LABELS}/{key}.label" for key in keys)}
 
 
-def test_the_card_says_what_the_labels_mean(make_drive: MakeDrive, tmp_path: Path) -> None:
+def test_the_card_says_what_the_labels_mean(make_drive, tmp_path) -> None:
     teach(Between(), of(make_drive()), tmp_path / "plain")
     card = load_card(tmp_path / "plain" / CARD)
     assert (card.rain, card.unknown, {*card.classes}) == ((1,), (255,), {0, 1, 255})
@@ -93,7 +91,7 @@ def test_the_card_says_what_the_labels_mean(make_drive: MakeDrive, tmp_path: Pat
     assert wads.licence in card.licence
 
 
-def test_truth_changes_no_byte(make_drive: MakeDrive, tmp_path: Path) -> None:
+def test_truth_changes_no_byte(make_drive, tmp_path) -> None:
     drive = make_drive(labelled=True)
     truth = drive.parent / LABELS
     teach(Between(), of(drive), tmp_path / "with")
@@ -110,7 +108,7 @@ def test_truth_changes_no_byte(make_drive: MakeDrive, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("labelled", [True, False])
-def test_labels_of_the_recording_stay(make_drive: MakeDrive, labelled: bool) -> None:
+def test_labels_of_the_recording_stay(make_drive, labelled) -> None:
     drive = make_drive(labelled=labelled)
     (drive.parent / LABELS).mkdir(exist_ok=True)
     before = contents(drive.parent)
@@ -120,7 +118,7 @@ def test_labels_of_the_recording_stay(make_drive: MakeDrive, labelled: bool) -> 
 
 
 @pytest.mark.parametrize("name", [CARD, TAUGHT_MANIFEST, f"{LABELS}/000000.label"])
-def test_what_is_no_teachers_stays(make_drive: MakeDrive, tmp_path: Path, name: str) -> None:
+def test_what_is_no_teachers_stays(make_drive, tmp_path, name) -> None:
     out = tmp_path / "out"
     (out / name).parent.mkdir(parents=True)
     (out / name).write_text("mine")
@@ -129,9 +127,7 @@ def test_what_is_no_teachers_stays(make_drive: MakeDrive, tmp_path: Path, name: 
     assert contents(out) == {name: b"mine"}
 
 
-def test_a_second_teaching_takes_the_place_of_the_first(
-    make_drive: MakeDrive, tmp_path: Path
-) -> None:
+def test_a_second_teaching_takes_the_place_of_the_first(make_drive, tmp_path) -> None:
     drive, out = make_drive(scans=6), tmp_path / "taught"
     teach(Between(), of(drive), out)
     teach(FilterDerainer(DROR(), 1), of(drive)[:4], out)
@@ -140,9 +136,7 @@ def test_a_second_teaching_takes_the_place_of_the_first(
 
 
 @pytest.mark.parametrize("there", [True, False])
-def test_what_fails_half_way_leaves_what_was_there(
-    make_drive: MakeDrive, tmp_path: Path, there: bool
-) -> None:
+def test_what_fails_half_way_leaves_what_was_there(make_drive, tmp_path, there) -> None:
     drive, out = make_drive(), tmp_path / "taught"
     if there:
         teach(Between(), of(drive), out)
@@ -155,7 +149,7 @@ def test_what_fails_half_way_leaves_what_was_there(
 
 
 def test_what_is_interrupted_while_it_is_put_in_place_is_known(
-    make_drive: MakeDrive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    make_drive, tmp_path, monkeypatch
 ) -> None:
     drive, out = make_drive(), tmp_path / "taught"
     teach(Between(), of(drive), out)
@@ -174,7 +168,7 @@ def test_what_is_interrupted_while_it_is_put_in_place_is_known(
 
 
 def test_where_nothing_is_known_or_scans_are_in_no_file_nothing_is_written(
-    make_drive: MakeDrive, tmp_path: Path
+    make_drive, tmp_path
 ) -> None:
     with pytest.raises(InputError, match="is sure of no point"):
         teach(Between(Dimmer(sure_within=0.0)), of(make_drive()), tmp_path / "out")

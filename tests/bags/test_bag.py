@@ -27,7 +27,7 @@ from derain.sources.folders import named_frames
 
 
 @pytest.fixture(params=STORAGES)
-def storage(request: pytest.FixtureRequest) -> Storage:
+def storage(request) -> Storage:
     kind: Storage = request.param
     return kind
 
@@ -43,13 +43,13 @@ def refusal(act: Callable[[], Any]) -> str:
     return str(error.value)
 
 
-def test_an_empty_bag_is_refused(tmp_path: Path, storage: Storage) -> None:
+def test_an_empty_bag_is_refused(tmp_path, storage) -> None:
     bag = write_bag(bag_path(tmp_path, storage), storage, [])
     assert "no point clouds" in refusal(lambda: named_frames([bag]))
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 0.999])
-def test_a_bag_that_is_cut_off_is_refused(tmp_path: Path, storage: Storage, share: float) -> None:
+def test_a_bag_that_is_cut_off_is_refused(tmp_path, storage, share) -> None:
     bag = small_bag(tmp_path, storage)
     file = storage_file(bag)
     os.truncate(file, int(share * file.stat().st_size))
@@ -58,7 +58,7 @@ def test_a_bag_that_is_cut_off_is_refused(tmp_path: Path, storage: Storage, shar
     assert "cannot be read as a bag" in told
 
 
-def test_an_encrypted_bag_is_refused(tmp_path: Path) -> None:
+def test_an_encrypted_bag_is_refused(tmp_path) -> None:
     bag = small_bag(tmp_path, "ros1")
     content = bag.read_bytes()
     size = int.from_bytes(content[13:17], "little")
@@ -83,9 +83,7 @@ def test_an_encrypted_bag_is_refused(tmp_path: Path) -> None:
         ({"relative_file_paths": ["missing.mcap"]}, "missing"),
     ],
 )
-def test_metadata_that_the_library_does_not_know_is_refused(
-    tmp_path: Path, change: dict[str, Any], reason: str
-) -> None:
+def test_metadata_that_the_library_does_not_know_is_refused(tmp_path, change, reason) -> None:
     bag = small_bag(tmp_path, "mcap")
     metadata = yaml.safe_load((bag / "metadata.yaml").read_text("utf-8"))
     metadata["rosbag2_bagfile_information"] |= change
@@ -93,7 +91,7 @@ def test_metadata_that_the_library_does_not_know_is_refused(
     assert reason in refusal(lambda: named_frames([bag]))
 
 
-def test_metadata_may_stand_for_what_it_has_said(tmp_path: Path) -> None:
+def test_metadata_may_stand_for_what_it_has_said(tmp_path) -> None:
     """As Python writes it, where ROS 2 would write it out."""
     bag = small_bag(tmp_path, "sqlite3")
     metadata = yaml.safe_load((bag / "metadata.yaml").read_text("utf-8"))
@@ -109,14 +107,12 @@ def test_metadata_may_stand_for_what_it_has_said(tmp_path: Path) -> None:
     ("name", "remedy"),
     [("drive.bag.active", "rosbag reindex"), ("drive_0.db3.zstd", "Name the bag's folder")],
 )
-def test_a_file_that_is_no_whole_bag_is_told(tmp_path: Path, name: str, remedy: str) -> None:
+def test_a_file_that_is_no_whole_bag_is_told(tmp_path, name, remedy) -> None:
     (tmp_path / name).touch()
     assert remedy in refusal(lambda: named_frames([tmp_path / name]))
 
 
-def test_clouds_of_one_stamp_are_told_of_once(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_clouds_of_one_stamp_are_told_of_once(tmp_path, capsys) -> None:
     ros, clouds = Ros("mcap"), tables(4)
     times = (START, START + 5, START + 5, START + 5)
     bag = small_bag(tmp_path, "mcap", clouds=[], more=[
@@ -132,9 +128,7 @@ def test_clouds_of_one_stamp_are_told_of_once(
 @pytest.mark.parametrize(
     ("stated", "reason"), [(10**15, "messages are stated in"), (5, "than the 5 of its index")]
 )
-def test_a_bag_with_fewer_clouds_than_it_says_is_refused(
-    tmp_path: Path, stated: int, reason: str
-) -> None:
+def test_a_bag_with_fewer_clouds_than_it_says_is_refused(tmp_path, stated, reason) -> None:
     bag = small_bag(tmp_path, "sqlite3")
     metadata = yaml.safe_load((bag / "metadata.yaml").read_text("utf-8"))
     for topic in metadata["rosbag2_bagfile_information"]["topics_with_message_count"]:
@@ -144,15 +138,13 @@ def test_a_bag_with_fewer_clouds_than_it_says_is_refused(
     assert reason in refusal(lambda: read_all(bag))
 
 
-def test_a_topic_with_a_nul_in_its_name_is_refused(tmp_path: Path, storage: Storage) -> None:
+def test_a_topic_with_a_nul_in_its_name_is_refused(tmp_path, storage) -> None:
     text = Recorded("/dri\0ver", TEXT_TYPE, START, Ros(storage).text("no cloud"))
     bag = small_bag(tmp_path, storage, more=[text])
     assert "NUL" in refusal(lambda: named_frames([bag]))
 
 
-def test_more_topics_than_a_recording_has_are_refused(
-    tmp_path: Path, storage: Storage, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_more_topics_than_a_recording_has_are_refused(tmp_path, storage, monkeypatch) -> None:
     bag = small_bag(tmp_path, storage)
     for module in (bag_module, rosbags_reader):
         monkeypatch.setattr(module, "MOST_TOPICS", 2)

@@ -60,18 +60,14 @@ def topic_of(topics: list[dict[str, Any]], name: str) -> dict[str, Any]:
         ),
     ],
 )
-def test_messages_that_a_database_does_not_index_are_not_dropped(
-    tmp_path: Path, change: Callable[[Path], None], reason: str
-) -> None:
+def test_messages_that_a_database_does_not_index_are_not_dropped(tmp_path, change, reason) -> None:
     bag = small_bag(tmp_path, "sqlite3")
     change(bag)
     with pytest.raises(InputError, match=reason):
         copied(bag, tmp_path / "out")
 
 
-def test_a_table_that_ros_2_does_not_know_is_told(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_table_that_ros_2_does_not_know_is_told(tmp_path, capsys) -> None:
     bag = small_bag(tmp_path, "sqlite3")
     change_database(bag, "CREATE TABLE notes(note TEXT)")
     copied(bag, tmp_path / "out")
@@ -102,7 +98,7 @@ def without_a_chunk(content: bytes) -> bytes:
     ],
 )
 def test_an_index_of_ros_1_that_differs_from_the_chunks_is_refused(
-    tmp_path: Path, change: Callable[[bytes], bytes], reason: str
+    tmp_path, change, reason
 ) -> None:
     bag = small_bag(tmp_path, "ros1")
     changed = change(bag.read_bytes())

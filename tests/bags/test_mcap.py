@@ -87,7 +87,7 @@ def all_of(file: BinaryIO) -> list[tuple[Any, ...]]:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_cleaned_file_keeps_all_but_the_rain(tmp_path: Path, kind: str, run_derain) -> None:
+def test_a_cleaned_file_keeps_all_but_the_rain(tmp_path, kind, run_derain) -> None:
     bag = record(tmp_path / "drive.mcap", Ros("mcap"), **KINDS[kind])
     outcome = run_derain("run", "ror", bag, "--out", tmp_path / "out")
     assert (outcome.code, outcome.said) == (0, [])
@@ -96,7 +96,7 @@ def test_a_cleaned_file_keeps_all_but_the_rain(tmp_path: Path, kind: str, run_de
     assert len(named_frames([tmp_path / "out/drive"])) == 3
 
 
-def test_messages_of_a_file_in_any_order_come_in_that_of_time(tmp_path: Path) -> None:
+def test_messages_of_a_file_in_any_order_come_in_that_of_time(tmp_path) -> None:
     ros = Ros("mcap")
     forward = Bag(record(tmp_path / "a.mcap", ros))
     for name, options in (("b", {}), ("c", {"use_chunking": False})):
@@ -109,7 +109,7 @@ def test_messages_of_a_file_in_any_order_come_in_that_of_time(tmp_path: Path) ->
         ]
 
 
-def test_ros_1_in_mcap_is_read_and_written(tmp_path: Path, run_derain) -> None:
+def test_ros_1_in_mcap_is_read_and_written(tmp_path, run_derain) -> None:
     bag = record(tmp_path / "drive.mcap", Ros("ros1"))
     assert run_derain("run", "ror", bag, "--out", tmp_path / "out").code == 0
     for frame, table in zip(named_frames([bag]), tables(3), strict=True):
@@ -118,9 +118,7 @@ def test_ros_1_in_mcap_is_read_and_written(tmp_path: Path, run_derain) -> None:
         assert make_reader(new).get_header().profile == "ros1"
 
 
-def test_chunks_of_one_time_that_are_too_many_are_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_chunks_of_one_time_that_are_too_many_are_refused(tmp_path, monkeypatch) -> None:
     bag = record(tmp_path / "drive.mcap", Ros("mcap"))
     monkeypatch.setattr(mcap_reader, "MOST_HELD", 1000)
     with pytest.raises(InputError, match="in chunks of one time"):
@@ -133,7 +131,7 @@ def copied(path: Path, out: Path) -> Path:
         return copy.finish()
 
 
-def test_a_damaged_attachment_is_told(tmp_path: Path) -> None:
+def test_a_damaged_attachment_is_told(tmp_path) -> None:
     bag = record(tmp_path / "drive.mcap", Ros("mcap"))
     bag.write_bytes(bag.read_bytes().replace(b"a notea note", b"a notea n0te", 1))
     with pytest.raises(InputError, match="checksum of an attachment"):
@@ -149,9 +147,7 @@ def test_a_damaged_attachment_is_told(tmp_path: Path) -> None:
         (without_a_chunk, "does not match its chunks"),
     ],
 )
-def test_a_summary_that_differs_from_the_data_is_refused(
-    tmp_path: Path, change: Any, reason: str
-) -> None:
+def test_a_summary_that_differs_from_the_data_is_refused(tmp_path, change, reason) -> None:
     bag = record(tmp_path / "drive.mcap", Ros("mcap"))
     bag.write_bytes(with_summary(bag.read_bytes(), change))
     with pytest.raises(InputError, match=reason):
@@ -161,7 +157,7 @@ def test_a_summary_that_differs_from_the_data_is_refused(
 PRIVATE = struct.pack("<BQ", 0x90, 5) + b"notes"
 
 
-def test_private_records_are_copied_and_messages_outside_chunks_not_dropped(tmp_path: Path) -> None:
+def test_private_records_are_copied_and_messages_outside_chunks_not_dropped(tmp_path) -> None:
     bag = record(tmp_path / "drive.mcap", Ros("mcap"))
     content = bag.read_bytes()
     bag.write_bytes(with_summary(content, list, data=PRIVATE))
@@ -193,7 +189,7 @@ def add_private(writer: Any) -> None:
     ],
 )
 def test_what_a_copy_would_drop_is_refused_and_does_not_matter_to_reading(
-    tmp_path: Path, kind: str, extra: Callable[[Writer], None], reason: str
+    tmp_path, kind, extra, reason
 ) -> None:
     bag = record(tmp_path / "drive.mcap", Ros("mcap"), extra=extra, **KINDS[kind])
     assert [len(frame.read()) for frame in named_frames([bag])] == [300] * 3
@@ -210,7 +206,7 @@ def test_what_a_copy_would_drop_is_refused_and_does_not_matter_to_reading(
         ("zstd", POINTS.encode(), "its summary"),
     ],
 )
-def test_checksums_are_compared(tmp_path: Path, kind: str, changed: bytes, reason: str) -> None:
+def test_checksums_are_compared(tmp_path, kind, changed, reason) -> None:
     options = KINDS[kind] | {"enable_data_crcs": reason == "its data"}
     bag = record(tmp_path / "drive.mcap", Ros("mcap"), **options)
     copied(bag, tmp_path / "whole")

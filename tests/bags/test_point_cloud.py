@@ -55,7 +55,7 @@ def points_of(cloud: PointCloud) -> list[bytes]:
 
 
 @given(clouds(), st.data())
-def test_taking_points_keeps_every_byte_of_them(cloud: PointCloud, data: st.DataObject) -> None:
+def test_taking_points_keeps_every_byte_of_them(cloud, data) -> None:
     rows = np.array(data.draw(st.lists(st.booleans(), min_size=len(cloud), max_size=len(cloud))))
     taken = cloud.take(rows.astype(bool))
 
@@ -65,7 +65,7 @@ def test_taking_points_keeps_every_byte_of_them(cloud: PointCloud, data: st.Data
 
 
 @given(clouds())
-def test_columns_are_what_the_bytes_say(cloud: PointCloud) -> None:
+def test_columns_are_what_the_bytes_say(cloud) -> None:
     order, points = ">" if cloud.is_bigendian else "<", points_of(cloud)
     for field in cloud.fields:
         dtype = np.dtype(order + DATATYPES[field.datatype])
@@ -76,7 +76,7 @@ def test_columns_are_what_the_bytes_say(cloud: PointCloud) -> None:
 
 
 @given(clouds())
-def test_a_column_more_leaves_the_others_in_their_place(cloud: PointCloud) -> None:
+def test_a_column_more_leaves_the_others_in_their_place(cloud) -> None:
     values = np.linspace(0, 1, len(cloud), dtype=np.float32)
     wider = cloud.with_field("probability", values)
 
@@ -106,7 +106,7 @@ def test_no_count_means_one_value_and_one_row_needs_no_step() -> None:
         ((2**32 - 1, 2**32 - 1, X, False, 4, 16, b"", True), "rows of"),
     ],
 )
-def test_contradictions_are_refused(arguments: tuple[Any, ...], reason: str) -> None:
+def test_contradictions_are_refused(arguments, reason) -> None:
     with pytest.raises(ValueError, match=reason):
         PointCloud(*arguments)
 

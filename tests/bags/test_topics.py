@@ -1,6 +1,5 @@
 """Which topic of a bag holds the point clouds that a user means."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -23,9 +22,7 @@ PACKETS = Topic("/packets", "velodyne_msgs/msg/VelodyneScan", 3, "cdr")
         ([FRONT, EMPTY], "/empty", EMPTY),
     ],
 )
-def test_the_topic_is_the_named_one_or_the_only_one(
-    topics: Sequence[Topic], name: str, chosen: Topic
-) -> None:
+def test_the_topic_is_the_named_one_or_the_only_one(topics, name, chosen) -> None:
     assert cloud_topic(BAG, topics, name) == chosen
 
 
@@ -40,9 +37,7 @@ def test_the_topic_is_the_named_one_or_the_only_one(
         ([PACKETS], "packets", ["/packets", "velodyne_pointcloud"]),
     ],
 )
-def test_a_refusal_names_the_topics_and_what_to_do(
-    topics: Sequence[Topic], name: str, words: Sequence[str]
-) -> None:
+def test_a_refusal_names_the_topics_and_what_to_do(topics, name, words) -> None:
     with pytest.raises(InputError) as error:
         cloud_topic(BAG, topics, name)
     assert not [word for word in words if word not in str(error.value)]

@@ -29,9 +29,7 @@ PACKERS: dict[str, Callable[[bytes], bytes]] = {
 
 
 @pytest.mark.parametrize("compression", PACKERS)
-def test_as_much_as_allowed_is_unpacked_and_no_more(
-    compression: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_as_much_as_allowed_is_unpacked_and_no_more(compression, monkeypatch) -> None:
     monkeypatch.setattr(unpacking, "MOST_UNPACKED", 2_000_000)
     pack = PACKERS[compression]
     assert unpack(pack(bytes(2_000_000)), compression) == bytes(2_000_000)
@@ -40,7 +38,7 @@ def test_as_much_as_allowed_is_unpacked_and_no_more(
 
 
 @pytest.mark.parametrize("compression", ["bz2", "lz4", "zstd"])
-def test_what_is_cut_off_or_no_such_thing_is_refused(compression: str) -> None:
+def test_what_is_cut_off_or_no_such_thing_is_refused(compression) -> None:
     packed = PACKERS[compression](bytes(range(256)) * 40)
     for damaged in (packed[:-4], b"", b"spam" * 20):
         with pytest.raises((ValueError, OSError, RuntimeError, zstandard.ZstdError)):
@@ -50,7 +48,7 @@ def test_what_is_cut_off_or_no_such_thing_is_refused(compression: str) -> None:
 
 
 @pytest.fixture
-def compressed_bag(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def compressed_bag(tmp_path, monkeypatch) -> Path:
     """A bag whose file is compressed as a whole; it is unpacked to ``tmp``."""
     bag = small_bag(tmp_path, "sqlite3")
     file = storage_file(bag)
@@ -67,7 +65,7 @@ def compressed_bag(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_files_that_do_not_fit_on_the_disk_are_refused(
-    compressed_bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    compressed_bag, tmp_path, monkeypatch
 ) -> None:
     monkeypatch.setattr(unpacking, "LEFT", 2**62)
     with pytest.raises(InputError, match="more than the free space"):
@@ -75,9 +73,7 @@ def test_files_that_do_not_fit_on_the_disk_are_refused(
     assert not list((tmp_path / "tmp").iterdir())
 
 
-def test_a_bag_is_unpacked_once_for_all_who_read_it(
-    compressed_bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_bag_is_unpacked_once_for_all_who_read_it(compressed_bag, tmp_path, monkeypatch) -> None:
     frames = named_frames([compressed_bag])
     again = named_frames([compressed_bag / "000001"])
     # What another process gets, which has unpacked nothing.
@@ -110,7 +106,7 @@ assert len(os.listdir(sys.argv[2])) == 1
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="the system has no fork")
 def test_what_is_unpacked_is_gone_when_the_process_ends_and_not_when_one_that_it_began_does(
-    compressed_bag: Path, tmp_path: Path
+    compressed_bag, tmp_path
 ) -> None:
     subprocess.run([sys.executable, "-c", READS, compressed_bag, tmp_path / "tmp"], check=True)
     assert not list((tmp_path / "tmp").iterdir())

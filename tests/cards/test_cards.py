@@ -29,7 +29,7 @@ OWN: dict[str, Any] = {
 
 
 @pytest.fixture
-def card_file(tmp_path: Path) -> Path:
+def card_file(tmp_path) -> Path:
     return tmp_path / "yard.yaml"
 
 
@@ -41,7 +41,7 @@ def written(card_file: Path, *missing: str, **changes: Any) -> DataCard:
 
 
 @pytest.mark.parametrize("name", packaged_cards())
-def test_a_packaged_card_can_be_read(name: str) -> None:
+def test_a_packaged_card_can_be_read(name) -> None:
     card = load_card(name)
     assert set(card.rain) <= set(card.classes)
     assert card.std is None or min(card.std) > 0
@@ -59,9 +59,7 @@ def test_a_packaged_card_can_be_read(name: str) -> None:
         ("rehearse3d", (1.070, 14.840), (3,)),
     ],
 )
-def test_the_rain_share_gives_the_published_class_weights(
-    name: str, weights: tuple[float, float], rain: tuple[int, ...]
-) -> None:
+def test_the_rain_share_gives_the_published_class_weights(name, weights, rain) -> None:
     card = load_card(name)
     assert card.rain_share is not None
     assert class_weights([1 - card.rain_share, card.rain_share]).tolist() == pytest.approx(
@@ -72,7 +70,7 @@ def test_the_rain_share_gives_the_published_class_weights(
         assert math.isclose(card.rain_share, 0.06638644365199696, rel_tol=1e-6)
 
 
-def test_a_card_of_ones_own_holds_what_its_file_says(card_file: Path) -> None:
+def test_a_card_of_ones_own_holds_what_its_file_says(card_file) -> None:
     assert written(card_file) == DataCard(
         name="our yard",
         classes={0: "ground", 3: "rain", 4: "spray"},
@@ -86,12 +84,12 @@ def test_a_card_of_ones_own_holds_what_its_file_says(card_file: Path) -> None:
     )
 
 
-def test_a_card_of_an_earlier_version_keeps_its_automatic_detection(card_file: Path) -> None:
+def test_a_card_of_an_earlier_version_keeps_its_automatic_detection(card_file) -> None:
     assert written(card_file, folders_tell="rain").auto_detect == "rain"
 
 
 @pytest.mark.parametrize("missing", ["mean", "std", "range", "rain_share"])
-def test_a_card_is_completed_by_the_statistics_that_it_lacks(card_file: Path, missing: str) -> None:
+def test_a_card_is_completed_by_the_statistics_that_it_lacks(card_file, missing) -> None:
     card = written(card_file, missing)
     assert not card.has_statistics
     statistics = {"mean": (0.0,) * 4, "std": (1.0,) * 4, "range": (9.0, 9.0), "rain_share": 0.5}
@@ -102,7 +100,7 @@ def test_a_card_is_completed_by_the_statistics_that_it_lacks(card_file: Path, mi
     assert whole == replace(card, extra=extra, **{missing: statistics[missing]})
 
 
-def test_every_channel_has_its_statistics_and_its_unit(card_file: Path) -> None:
+def test_every_channel_has_its_statistics_and_its_unit(card_file) -> None:
     card = written(card_file)
     assert card.statistics("intensity") == (4, 8)
     assert card.statistics("range") == (9, 10)
@@ -128,7 +126,7 @@ def test_every_channel_has_its_statistics_and_its_unit(card_file: Path) -> None:
     ],
     ids=shown,
 )
-def test_a_card_that_makes_no_sense_is_refused(card_file: Path, key: str, value: Any) -> None:
+def test_a_card_that_makes_no_sense_is_refused(card_file, key, value) -> None:
     with pytest.raises(InputError, match=rf"yard\.yaml: {key}.*: ") as refusal:
         written(card_file, **{key: value})
     assert len(str(refusal.value)) < len(str(card_file)) + 300
@@ -139,7 +137,7 @@ def test_an_unknown_name_is_answered_with_the_known_ones() -> None:
         load_card("rehearse")
 
 
-def test_classes_are_rain_unknown_or_neither(card_file: Path) -> None:
+def test_classes_are_rain_unknown_or_neither(card_file) -> None:
     scan = Scan.of(np.arange(16.0).reshape(4, 4), name="a.bin")
     card = written(card_file, rain=[3], unknown=[4])
     labelled = scan.with_label(np.array([0, 3, 4, 3]))

@@ -13,14 +13,14 @@ REHEARSE3D = Layout(scans="lidar_radar_pcd", labels="lidar_radar_labels", lidar=
 CARD = "name: ours\nclasses: {0: dry, 1: wet}\nrain: [1]\n"
 
 
-def test_a_card_says_where_its_scans_lie(tmp_path: Path) -> None:
+def test_a_card_says_where_its_scans_lie(tmp_path) -> None:
     (tmp_path / "ours.yaml").write_text(f"{CARD}layout: {{sequences: drives, labels: truth}}")
     layout = load_card(tmp_path / "ours.yaml").layout
     assert layout == Layout(sequences="drives", scans="velodyne", labels="truth", lidar="")
 
 
 @pytest.mark.parametrize("name", ["''", "..", "a/b", "7"])
-def test_a_folder_of_a_layout_is_one_name(tmp_path: Path, name: str) -> None:
+def test_a_folder_of_a_layout_is_one_name(tmp_path, name) -> None:
     (tmp_path / "ours.yaml").write_text(f"{CARD}layout: {{scans: {name}}}")
     with pytest.raises(InputError, match=r"ours\.yaml"):
         load_card(tmp_path / "ours.yaml")
@@ -50,19 +50,17 @@ def test_folders_tell_no_more_than_their_card_says() -> None:
         ("7/anything/3.5.pcd", "7/labels/3.5.label"),
     ],
 )
-def test_labels_are_looked_for_where_the_folders_say(tmp_path: Path, scan: str, label: str) -> None:
+def test_labels_are_looked_for_where_the_folders_say(tmp_path, scan, label) -> None:
     assert label_of(tmp_path / scan) == tmp_path / label
     assert tmp_path / label in label_places(tmp_path / scan)
 
 
-def test_labels_beside_a_scan_go_before_those_in_a_folder(tmp_path: Path) -> None:
+def test_labels_beside_a_scan_go_before_those_in_a_folder(tmp_path) -> None:
     (tmp_path / "3.label").touch()
     assert label_of(tmp_path / "3.bin") == tmp_path / "3.label"
 
 
-def test_the_folder_above_is_found_from_within(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_folder_above_is_found_from_within(tmp_path, monkeypatch) -> None:
     (tmp_path / "a/b").mkdir(parents=True)
     monkeypatch.chdir(tmp_path / "a/b")
     assert folder_above(Path()) == tmp_path / "a"

@@ -29,7 +29,7 @@ def write_labelled() -> WriteScan:
 
 
 @pytest.fixture
-def wads(tmp_path: Path, write_labelled: WriteScan) -> list[str]:
+def wads(tmp_path, write_labelled) -> list[str]:
     """Options for a data set in the layout of WADS, of three sequences of one scan each.
 
     Nothing is drawn of a training.
@@ -47,7 +47,7 @@ def wads(tmp_path: Path, write_labelled: WriteScan) -> list[str]:
 
 
 @pytest.fixture
-def refused(run_derain: Callable[..., Any]) -> Callable[..., str]:
+def refused(run_derain) -> Callable[..., str]:
     """Runs a command that is refused with exit code 2 before it prints anything; gives the line."""
 
     def run(*arguments: str | Path) -> str:
@@ -61,7 +61,7 @@ def refused(run_derain: Callable[..., Any]) -> Callable[..., str]:
 
 
 @pytest.fixture
-def succeed(run_derain: Callable[..., Any]) -> Callable[..., Any]:
+def succeed(run_derain) -> Callable[..., Any]:
     """Runs a command that ends with exit code 0; gives its outcome."""
 
     def run(*arguments: str | Path) -> Any:
@@ -73,7 +73,7 @@ def succeed(run_derain: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @pytest.fixture
-def facts_of(succeed: Callable[..., Any]) -> Callable[..., dict[str, Any]]:
+def facts_of(succeed) -> Callable[..., dict[str, Any]]:
     """What `derain info` prints as JSON of the standard: without NaN and infinity."""
 
     def refuse(constant: str) -> None:

@@ -28,7 +28,7 @@ corrections:
 
 
 @pytest.fixture
-def sequence(tmp_path: Path) -> Path:
+def sequence(tmp_path) -> Path:
     """A sequence of three scans: a road, a wall and drops, and its labels by another hand."""
     folder = tmp_path / "data" / "sequences" / "003"
     for number in range(3):
@@ -38,7 +38,7 @@ def sequence(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def annotate(succeed, tmp_path: Path, sequence: Path) -> Callable[..., Any]:
+def annotate(succeed, tmp_path, sequence) -> Callable[..., Any]:
     """Labels the sequence."""
 
     def run(out: Path, *options: str | Path) -> Any:
@@ -52,7 +52,7 @@ def labels(out: Path, points: int = 2000) -> list[np.ndarray]:
     return [semantic(read_labels(path, points)) for path in sorted(out.glob("*.label"))]
 
 
-def test_a_sequence_is_labelled_counted_and_drawn(annotate, tmp_path: Path, sequence: Path) -> None:
+def test_a_sequence_is_labelled_counted_and_drawn(annotate, tmp_path, sequence) -> None:
     out = tmp_path / "out"
     outcome = annotate(out, "--json")
     report = json.loads(outcome.out)
@@ -73,7 +73,7 @@ def test_a_sequence_is_labelled_counted_and_drawn(annotate, tmp_path: Path, sequ
         assert (label[low] == TrackClass.ROAD).mean() > 0.99
 
 
-def test_the_text_holds_the_plane_and_the_points_by_class(annotate, tmp_path: Path) -> None:
+def test_the_text_holds_the_plane_and_the_points_by_class(annotate, tmp_path) -> None:
     lines = annotate(tmp_path / "out", "--no-picture").out.splitlines()
     assert lines[0] == "sequence 003: 3 scans, 6,000 points"
     assert lines[1].startswith("road: 1.")
@@ -83,7 +83,7 @@ def test_the_text_holds_the_plane_and_the_points_by_class(annotate, tmp_path: Pa
     assert not list((tmp_path / "out").glob("*.png"))
 
 
-def test_corrections_are_those_of_the_sequence_named(annotate, tmp_path: Path) -> None:
+def test_corrections_are_those_of_the_sequence_named(annotate, tmp_path) -> None:
     rain = {}
     for name in ("003", "007"):
         annotate(tmp_path / name, "--no-picture", "--sequence", name)
@@ -91,7 +91,7 @@ def test_corrections_are_those_of_the_sequence_named(annotate, tmp_path: Path) -
     assert rain["007"] > rain["003"] + 1000  # nothing keeps the wall from being rain
 
 
-def test_radar_points_take_the_label_of_the_nearest_point(annotate, tmp_path: Path) -> None:
+def test_radar_points_take_the_label_of_the_nearest_point(annotate, tmp_path) -> None:
     points = scene(2000, 1)[::100]
     points[-1] = (500, 0, 0, 0)
     write_scan(tmp_path / "radar/000001.bin", Scan.of(points))
@@ -102,7 +102,7 @@ def test_radar_points_take_the_label_of_the_nearest_point(annotate, tmp_path: Pa
     assert radar[-1] == UNKNOWN
 
 
-def test_the_scene_file_of_the_help_can_be_read(tmp_path: Path) -> None:
+def test_the_scene_file_of_the_help_can_be_read(tmp_path) -> None:
     _, text = (module_of("annotate").__doc__ or "").split("up):\n")
     example, _ = text.split("The classes are")
     (tmp_path / "scene.yaml").write_text(dedent(example))
@@ -113,9 +113,7 @@ def test_the_scene_file_of_the_help_can_be_read(tmp_path: Path) -> None:
     assert all(kind.name.lower() in text for kind in TrackClass)
 
 
-def test_labels_that_came_with_the_scans_are_not_overwritten(
-    refused, tmp_path: Path, sequence: Path
-) -> None:
+def test_labels_that_came_with_the_scans_are_not_overwritten(refused, tmp_path, sequence) -> None:
     for own in ("lidar_radar_pcd", "lidar_radar_labels", "labels"):
         (sequence / own).mkdir(exist_ok=True)
         before = sorted(sequence.rglob("*"))
@@ -123,7 +121,7 @@ def test_labels_that_came_with_the_scans_are_not_overwritten(
         assert sorted(sequence.rglob("*")) == before
 
 
-def test_a_radar_frame_of_no_scan_is_refused(refused, tmp_path: Path, sequence: Path) -> None:
+def test_a_radar_frame_of_no_scan_is_refused(refused, tmp_path, sequence) -> None:
     write_scan(tmp_path / "radar/000009.bin", Scan.of(scene(20)))
     arguments = ["--scene", tmp_path / "scene.yaml", "--out", tmp_path / "out"]
     line = refused("annotate", sequence, *arguments, "--radar", tmp_path / "radar")

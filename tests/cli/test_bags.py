@@ -1,17 +1,16 @@
 """Commands that read bags: they print what is in one, draw, teach and measure by its clouds."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 from small_bags import small_bag, tables
 
-from benchmarks.recorded_bags import CLOUD_TYPE, START, STORAGES, Recorded, Ros, Storage
+from benchmarks.recorded_bags import CLOUD_TYPE, START, STORAGES, Recorded, Ros
 
 
 @pytest.mark.parametrize("storage", STORAGES)
-def test_info_prints_what_is_in_a_bag(tmp_path: Path, storage: Storage, run_derain) -> None:
+def test_info_prints_what_is_in_a_bag(tmp_path, storage, run_derain) -> None:
     bag = small_bag(tmp_path, storage)
     facts = json.loads(run_derain("info", bag, "--json").out)
 
@@ -26,7 +25,7 @@ def test_info_prints_what_is_in_a_bag(tmp_path: Path, storage: Storage, run_dera
     assert cloud["points"] == 300
 
 
-def test_a_topic_is_named_by_an_option(tmp_path: Path, run_derain) -> None:
+def test_a_topic_is_named_by_an_option(tmp_path, run_derain) -> None:
     ros, (table,) = Ros("mcap"), tables(1)
     rear = Recorded("/rear", CLOUD_TYPE, START + 5, ros.cloud(table[:200], START))
     bag = small_bag(tmp_path, "mcap", more=[rear])
@@ -40,7 +39,7 @@ def test_a_topic_is_named_by_an_option(tmp_path: Path, run_derain) -> None:
     assert "/rear" in told.err
 
 
-def test_view_draws_the_cloud_that_is_named_or_the_first(tmp_path: Path, succeed) -> None:
+def test_view_draws_the_cloud_that_is_named_or_the_first(tmp_path, succeed) -> None:
     bag, picture = small_bag(tmp_path, "mcap"), tmp_path / "figure.png"
     command = ["view", "--methods", "ror", "--out", picture]
     assert "is drawn" not in succeed(*command, bag / "000001").out
@@ -49,7 +48,7 @@ def test_view_draws_the_cloud_that_is_named_or_the_first(tmp_path: Path, succeed
     assert picture.stat().st_size > 10_000
 
 
-def test_a_bag_has_the_weather_of_its_scans_as_files(tmp_path: Path, succeed) -> None:
+def test_a_bag_has_the_weather_of_its_scans_as_files(tmp_path, succeed) -> None:
     clouds, files = tables(points=2000), tmp_path / "files"
     files.mkdir()
     for number, cloud in enumerate(clouds):

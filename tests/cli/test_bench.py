@@ -25,13 +25,13 @@ def read_report(folder: Path) -> dict[str, Any]:
 
 
 @pytest.fixture(autouse=True)
-def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+def in_this_process(monkeypatch) -> None:
     """Times methods in this process; that each has its own is tested by itself."""
     monkeypatch.setattr(bench, "measure_cost", measure_in_process)
 
 
 @pytest.fixture
-def root(tmp_path: Path, write_labelled) -> Path:
+def root(tmp_path, write_labelled) -> Path:
     """A simulated data set: one training, one validation and three test sequences."""
     root = tmp_path / "set"
     for number in range(5):
@@ -47,9 +47,7 @@ def root(tmp_path: Path, write_labelled) -> Path:
     return root
 
 
-def test_every_method_and_baseline_stands_in_one_table(
-    succeed, root: Path, tmp_path: Path, onnx_model: Path
-) -> None:
+def test_every_method_and_baseline_stands_in_one_table(succeed, root, tmp_path, onnx_model) -> None:
     out = tmp_path / "out"
     outcome = succeed(
         "bench", "--data", root, "--methods", onnx_model, *METHODS, *ONCE, "--out", out
@@ -74,7 +72,7 @@ def test_every_method_and_baseline_stands_in_one_table(
 
 
 def test_units_are_scored_as_one_process_scores_and_warned_of_alike(
-    run_derain, succeed, root: Path, tmp_path: Path, onnx_model: Path
+    run_derain, succeed, root, tmp_path, onnx_model
 ) -> None:
     for path in root.rglob("*.bin"):
         points = np.fromfile(path, np.float32).reshape(-1, 4)
@@ -106,7 +104,7 @@ def report(folder: Path) -> dict[str, Any]:
 
 
 def test_a_bench_that_goes_on_scores_no_unit_again_and_refuses_other_methods(
-    succeed, refused, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    succeed, refused, root, tmp_path, monkeypatch
 ) -> None:
     arguments = ["bench", "--data", root, *ONCE, "--resume", "--out", tmp_path, "--methods"]
     succeed(*arguments, "dror", "position")
@@ -120,7 +118,7 @@ def test_a_bench_that_goes_on_scores_no_unit_again_and_refuses_other_methods(
 
 
 @pytest.fixture
-def knowing(root: Path, onnx_model: Path, saying) -> Path:
+def knowing(root, onnx_model, saying) -> Path:
     """A model that was trained on the validation scans and two of the test scans."""
     spec = Derainer(onnx_model).metadata["spec"]
     trained = {"data": "simulated rain", "training": {"sequences": ["001", "002", "003"]}}
@@ -128,7 +126,7 @@ def knowing(root: Path, onnx_model: Path, saying) -> Path:
 
 
 def test_a_model_that_knows_the_scans_from_its_training_is_named(
-    succeed, root: Path, tmp_path: Path, onnx_model: Path, knowing: Path
+    succeed, root, tmp_path, onnx_model, knowing
 ) -> None:
     out = tmp_path / "out"
     methods = [f"knowing={knowing}", f"other={onnx_model}", "all"]
@@ -141,16 +139,12 @@ def test_a_model_that_knows_the_scans_from_its_training_is_named(
     assert note in (out / "bench.md").read_text()
 
 
-def test_a_threshold_tuned_on_training_scans_is_warned_of(
-    succeed, root: Path, tmp_path: Path, knowing: Path
-) -> None:
+def test_a_threshold_tuned_on_training_scans_is_warned_of(succeed, root, tmp_path, knowing) -> None:
     outcome = succeed("tune", knowing, "--data", root, "--out", tmp_path / "tuned.yaml")
     assert "was trained on 1 of these 1 scans" in outcome.err
 
 
-def test_the_command_in_the_report_makes_the_same_figures_again(
-    succeed, root: Path, tmp_path: Path
-) -> None:
+def test_the_command_in_the_report_makes_the_same_figures_again(succeed, root, tmp_path) -> None:
     options = ["--limit", "2", "--distinct", "--seed", "3", *ONCE]
     first, again = tmp_path / "first", tmp_path / "again"
     succeed("bench", "--data", root, "--methods", "t=dsor", "all", *options, "--out", first)
@@ -169,7 +163,7 @@ def test_the_command_in_the_report_makes_the_same_figures_again(
 
 
 def test_single_scans_are_benched_with_their_card(
-    run_derain, succeed, tmp_path: Path, write_labelled
+    run_derain, succeed, tmp_path, write_labelled
 ) -> None:
     write_labelled(tmp_path / "a.bin", tmp_path / "a.label", rain=110)
     data = ["--data", tmp_path / "a.bin", "--card", "wads"]
@@ -181,9 +175,7 @@ def test_single_scans_are_benched_with_their_card(
     assert not (tmp_path / "no").exists()
 
 
-def test_baselines_learn_nothing_from_points_that_may_be_rain_or_not(
-    succeed, tmp_path: Path
-) -> None:
+def test_baselines_learn_nothing_from_points_that_may_be_rain_or_not(succeed, tmp_path) -> None:
     # In the voxel at 1 m all that is known is rain; were the unknown taken for dry, it would not
     # be, and neither would the dim be. At 5 m all is known.
     x = np.repeat([1.0, 1.0, 5.0], [4, 40, 40])
@@ -200,7 +192,7 @@ def test_baselines_learn_nothing_from_points_that_may_be_rain_or_not(
 
 
 def test_points_that_a_scan_holds_twice_are_counted_once_unless_an_option_says_otherwise(
-    succeed, tmp_path: Path
+    succeed, tmp_path
 ) -> None:
     rows = np.random.default_rng(0).permutation(np.resize(np.arange(300), 420))
     scene(300)[rows].tofile(tmp_path / "scan.bin")
@@ -214,7 +206,7 @@ def test_points_that_a_scan_holds_twice_are_counted_once_unless_an_option_says_o
     assert list(read_report(tmp_path)["rows"][0]["counts"].values()) == [60, 240, 0, 0]
 
 
-def test_table_2_stands_beside_ours_for_each_part(succeed, root: Path, tmp_path: Path) -> None:
+def test_table_2_stands_beside_ours_for_each_part(succeed, root, tmp_path) -> None:
     out = tmp_path / "out"
     data = ["--paper", "table2", "--data", root, "--card", "rehearse3d"]
     outcome = succeed("bench", *data, "--methods", "dsor", "dror", "all", *ONCE, "--out", out)
@@ -230,7 +222,7 @@ def test_table_2_stands_beside_ours_for_each_part(succeed, root: Path, tmp_path:
     assert f"{100 * ours:.2f}" in outcome.out
 
 
-def test_table_3_takes_the_rain_rates_of_a_file(succeed, root: Path, tmp_path: Path) -> None:
+def test_table_3_takes_the_rain_rates_of_a_file(succeed, root, tmp_path) -> None:
     rates = tmp_path / "rates.yaml"
     rates.write_text(yaml.safe_dump({"002": 50, "003": 25}))
     out = tmp_path / "out"
@@ -241,9 +233,7 @@ def test_table_3_takes_the_rain_rates_of_a_file(succeed, root: Path, tmp_path: P
     assert "(*) DSOR, medium: F1" in outcome.out
 
 
-def test_the_papers_tables_need_a_data_set_with_a_split(
-    refused, root: Path, tmp_path: Path
-) -> None:
+def test_the_papers_tables_need_a_data_set_with_a_split(refused, root, tmp_path) -> None:
     scans = root / "sequences/002/lidar_radar_pcd"
     data = ["--paper", "table2", "--data", scans, "--card", "rehearse3d"]
     line = refused("bench", *data, "--methods", "all", "--out", tmp_path / "out")
@@ -251,7 +241,7 @@ def test_the_papers_tables_need_a_data_set_with_a_split(
 
 
 def test_a_folder_that_cannot_be_written_is_refused_before_any_work(
-    refused, root: Path, monkeypatch: pytest.MonkeyPatch
+    refused, root, monkeypatch
 ) -> None:
     monkeypatch.delattr(bench, "scorings")
     out = root / "manifest.json"

@@ -17,7 +17,7 @@ SAYS = "by the model that comes with derain: "
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def here(tmp_path, monkeypatch) -> Path:
     """The working folder, with a folder of two scans."""
     monkeypatch.chdir(tmp_path)
     for folder in ("scans", "crf"):
@@ -31,7 +31,7 @@ def judged(folder: Path) -> list[np.ndarray]:
 
 @pytest.mark.parametrize("words", [["scans/0.bin", "scans/1.bin"], ["default", "scans"], ["./crf"]])
 def test_scans_alone_are_cleaned_by_the_model_that_comes_with_derain(
-    run_derain, here: Path, words: list[str]
+    run_derain, here, words
 ) -> None:
     outcome = run_derain("run", *words, "--out", "cleaned")
     assert (outcome.code, outcome.said) == (0, [])
@@ -45,7 +45,7 @@ def test_scans_alone_are_cleaned_by_the_model_that_comes_with_derain(
     np.testing.assert_array_equal(judged(here / "cleaned"), expected)
 
 
-def test_with_json_it_is_named_beside_the_objects(succeed, here: Path) -> None:
+def test_with_json_it_is_named_beside_the_objects(succeed, here) -> None:
     outcome = succeed("run", "scans", "--out", "cleaned", "--json")
     assert [json.loads(line)["points"] for line in outcome.out.splitlines()] == [200, 200]
     assert outcome.err.startswith(SAYS)
@@ -59,9 +59,7 @@ def test_with_json_it_is_named_beside_the_objects(succeed, here: Path) -> None:
         ["--out", "cleaned", "dror", "scans/0.bin", "scans/1.bin"],
     ],
 )
-def test_a_method_that_is_named_is_the_one_that_cleans(
-    succeed, here: Path, words: list[str]
-) -> None:
+def test_a_method_that_is_named_is_the_one_that_cleans(succeed, here, words) -> None:
     outcome = succeed("run", *words)
     assert SAYS not in outcome.out + outcome.err
     assert len(judged(here / "cleaned")) == 2
@@ -83,7 +81,7 @@ def test_a_method_that_is_named_is_the_one_that_cleans(
     ],
 )
 def test_words_that_can_be_read_in_no_way_or_in_two_are_refused(
-    run_derain, here: Path, words: list[str], reason: str
+    run_derain, here, words, reason
 ) -> None:
     Path("notes").write_text("of no kind")
     Path("best.yaml").write_text("method: dsor\n")
@@ -93,7 +91,7 @@ def test_words_that_can_be_read_in_no_way_or_in_two_are_refused(
     assert not judged(here / "cleaned")
 
 
-def test_the_card_is_printed(run_derain, here: Path) -> None:
+def test_the_card_is_printed(run_derain, here) -> None:
     outcome = run_derain("info", "default")
     assert (outcome.code, outcome.err) == (0, "")
     card = model_card()
@@ -114,7 +112,7 @@ def test_scores_of_a_card_are_a_table() -> None:
     assert ["clean", "-", "-", "-", "0.050%"] in rows
 
 
-def test_a_folder_of_its_name_makes_the_name_ambiguous(run_derain, refused, here: Path) -> None:
+def test_a_folder_of_its_name_makes_the_name_ambiguous(run_derain, refused, here) -> None:
     (here / "default").mkdir()
     line = refused("info", "default")
     assert "default: it names the model that comes with derain" in line

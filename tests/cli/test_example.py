@@ -15,7 +15,7 @@ RAIN = load_card("simulated").rain
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def here(tmp_path, monkeypatch) -> Path:
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -30,7 +30,7 @@ def test_it_is_small_and_holds_rain_and_snow() -> None:
         np.testing.assert_array_equal(scan.xyz, read_scan(example_file(weather)).xyz)
 
 
-def test_run_cleans_it_and_prints_what_was_found_beside_the_truth(succeed, here: Path) -> None:
+def test_run_cleans_it_and_prints_what_was_found_beside_the_truth(succeed, here) -> None:
     *_, last = succeed("run", EXAMPLE, "--out", "cleaned").out.splitlines()
     found = others = total = 0
     for weather in ("rain", "snow"):
@@ -46,12 +46,12 @@ def test_run_cleans_it_and_prints_what_was_found_beside_the_truth(succeed, here:
     assert others < 0.1 * total
 
 
-def test_view_draws_it(succeed, here: Path) -> None:
+def test_view_draws_it(succeed, here) -> None:
     succeed("view", EXAMPLE, "--out", "figure.png")
     assert (here / "figure.png").stat().st_size > 1000
 
 
-def test_what_a_user_calls_so_is_the_users(succeed, here: Path) -> None:
+def test_what_a_user_calls_so_is_the_users(succeed, here) -> None:
     folder = here / EXAMPLE
     folder.mkdir()
     read = read_scan(example_file())

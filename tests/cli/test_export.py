@@ -10,14 +10,13 @@ from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
 from derain.export.runtime import Derainer
 from derain.files import read_scan
-from derain.models.base import DerainingModule
 from derain.models.checkpoint import save_model
 from derain.scan import Scan
 
 
 @pytest.mark.usefixtures("one_block")
 def test_a_checkpoint_becomes_a_model_with_its_proof_and_times(
-    succeed, checkpoint: Path, onnx_model: Path, tmp_path: Path
+    succeed, checkpoint, onnx_model, tmp_path
 ) -> None:
     scan, out = tmp_path / "scan.bin", tmp_path / "new" / "outdet.onnx"
     scene(500).tofile(scan)
@@ -38,7 +37,7 @@ def test_a_checkpoint_becomes_a_model_with_its_proof_and_times(
 
 
 @pytest.fixture
-def scans(tmp_path: Path, write_labelled, monkeypatch: pytest.MonkeyPatch) -> Path:
+def scans(tmp_path, write_labelled, monkeypatch) -> Path:
     """A folder of twenty labelled scans, more than eight bits are scaled by."""
     monkeypatch.chdir(tmp_path)
     for number in range(20):
@@ -49,12 +48,7 @@ def scans(tmp_path: Path, write_labelled, monkeypatch: pytest.MonkeyPatch) -> Pa
 
 @pytest.mark.usefixtures("one_block")
 def test_candidates_are_fitted_to_labelled_scans_and_their_cost_is_printed(
-    succeed,
-    checkpoint: Path,
-    onnx_model: Path,
-    scans: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    succeed, checkpoint, onnx_model, scans, tmp_path, monkeypatch
 ) -> None:
     # The whole proof is made above.
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
@@ -73,7 +67,7 @@ def test_candidates_are_fitted_to_labelled_scans_and_their_cost_is_printed(
 
 
 def test_scans_that_candidates_are_fitted_to_count_once_and_are_warned_of(
-    run_derain, checkpoint: Path, scans: Path, monkeypatch: pytest.MonkeyPatch
+    run_derain, checkpoint, scans, monkeypatch
 ) -> None:
     monkeypatch.setattr(onnx_file, "export", lambda model, path, *_: path.touch())
     monkeypatch.setattr("derain.export.timing.measure_latency", lambda *_: "times")
@@ -96,11 +90,7 @@ def test_scans_that_candidates_are_fitted_to_count_once_and_are_warned_of(
 
 
 def test_a_model_in_eight_bits_is_scaled_by_scans_like_those_it_will_see(
-    succeed,
-    random_salsanext: DerainingModule,
-    salsanext_onnx: Path,
-    scans: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    succeed, random_salsanext, salsanext_onnx, scans, monkeypatch
 ) -> None:
     monkeypatch.setattr(onnx_file, "_traced", lambda *_: onnx.load(salsanext_onnx))
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
@@ -132,13 +122,7 @@ def test_a_model_in_eight_bits_is_scaled_by_scans_like_those_it_will_see(
     ],
 )
 def test_what_cannot_be_exported_is_one_line_and_leaves_no_file(
-    refused,
-    checkpoint: Path,
-    onnx_model: Path,
-    scans: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    options: list[str],
-    reason: str,
+    refused, checkpoint, onnx_model, scans, monkeypatch, options, reason
 ) -> None:
     monkeypatch.setattr(onnx_file, "_traced", lambda *_: onnx.load(onnx_model))
     Path("empty").mkdir()

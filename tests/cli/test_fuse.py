@@ -31,7 +31,7 @@ def read_rows(file: Path) -> list[dict[str, str]]:
 
 
 @pytest.fixture
-def recording(tmp_path: Path) -> Path:
+def recording(tmp_path) -> Path:
     """Three LiDAR scans at 10 Hz, five radar frames that start and end between them."""
     for sensor in ("lidar", "radar", "labels"):
         (tmp_path / sensor).mkdir()
@@ -47,7 +47,7 @@ def recording(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def run_fuse(run_derain, recording: Path, monkeypatch: pytest.MonkeyPatch) -> Fuse:
+def run_fuse(run_derain, recording, monkeypatch) -> Fuse:
     """Fuses the recording."""
     monkeypatch.chdir(recording)
 
@@ -58,7 +58,7 @@ def run_fuse(run_derain, recording: Path, monkeypatch: pytest.MonkeyPatch) -> Fu
     return run
 
 
-def test_each_scan_is_joined_by_the_radar_frame_nearest_in_time(run_fuse: Fuse) -> None:
+def test_each_scan_is_joined_by_the_radar_frame_nearest_in_time(run_fuse) -> None:
     outcome = run_fuse()
     assert outcome.code == 0, outcome.err
     assert "3 scans in" in outcome.out
@@ -72,7 +72,7 @@ def test_each_scan_is_joined_by_the_radar_frame_nearest_in_time(run_fuse: Fuse) 
     assert not Path("out/lidar_radar_labels").exists()
 
 
-def test_the_metadata_name_what_was_joined_to_what(run_fuse: Fuse) -> None:
+def test_the_metadata_name_what_was_joined_to_what(run_fuse) -> None:
     for sensor in ("lidar", "radar"):
         path = Path(sensor, "metadata.csv")
         path.write_text(path.read_text().replace("frame,timestamp", "stem,seconds"))
@@ -84,9 +84,7 @@ def test_the_metadata_name_what_was_joined_to_what(run_fuse: Fuse) -> None:
 
 
 @pytest.mark.parametrize("reach", [0.01, 1000])
-def test_labels_reach_as_far_as_an_option_allows_and_instances_are_kept(
-    run_fuse: Fuse, reach: float
-) -> None:
+def test_labels_reach_as_far_as_an_option_allows_and_instances_are_kept(run_fuse, reach) -> None:
     assert run_fuse("--labels", "labels", "--label-within", str(reach)).code == 0
     raw = read_labels(Path("out/lidar_radar_labels/000001.label"), 40 + 12)
     np.testing.assert_array_equal(semantic(raw)[:40], np.arange(40) % 8)
@@ -94,7 +92,7 @@ def test_labels_reach_as_far_as_an_option_allows_and_instances_are_kept(
     np.testing.assert_array_equal(semantic(raw)[40:] != UNKNOWN, reach == 1000)
 
 
-def test_real_radar_detections_keep_their_doppler_and_rcs(run_fuse: Fuse, shared: Path) -> None:
+def test_real_radar_detections_keep_their_doppler_and_rcs(run_fuse, shared) -> None:
     detections = np.load(shared / "data/radar/ars548_detections.npy")
     for file in Path("radar").glob("*.bin"):
         file.unlink()
@@ -129,9 +127,7 @@ def put_on_another_clock() -> None:
         (None, ["--metadata-columns", "frame"], "frame is not two names"),
     ],
 )
-def test_what_cannot_be_fused_is_one_line_and_exit_code_2(
-    run_fuse: Fuse, spoil: Callable[[], None] | None, options: list[str], reason: str
-) -> None:
+def test_what_cannot_be_fused_is_one_line_and_exit_code_2(run_fuse, spoil, options, reason) -> None:
     if spoil is not None:
         spoil()
     outcome = run_fuse(*options)
@@ -143,7 +139,7 @@ def test_what_cannot_be_fused_is_one_line_and_exit_code_2(
     assert not any(name.startswith(".") or name == "metadata.csv" for name in left)
 
 
-def test_the_input_is_never_overwritten(run_fuse: Fuse) -> None:
+def test_the_input_is_never_overwritten(run_fuse) -> None:
     Path("lidar").rename("lidar_radar_pcd")
     outcome = run_fuse("--lidar", "lidar_radar_pcd", "--out", ".")
     assert (outcome.code, "would overwrite" in outcome.err) == (2, True)

@@ -15,12 +15,12 @@ from derain.views.spherical_grid import grid_of
 
 
 @pytest.fixture(autouse=True)
-def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _in_a_folder_of_its_own(tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
 @pytest.fixture
-def published(random_outdet: OutDet) -> dict[str, Tensor]:
+def published(random_outdet) -> dict[str, Tensor]:
     """The random network's weights under the published names, also in a file of their own."""
     tensors = random_outdet.network.state_dict()
     weights = {published: tensors[ours] for ours, published in PUBLISHED_KEYS.items()}
@@ -35,9 +35,7 @@ def assert_same_weights(checkpoint: Path, model: OutDet | SalsaNext) -> None:
 
 
 @pytest.mark.usefixtures("published")
-def test_normalisation_and_identity_are_two_things(
-    succeed, facts_of, random_outdet: OutDet
-) -> None:
+def test_normalisation_and_identity_are_two_things(succeed, facts_of, random_outdet) -> None:
     out = Path("outdet.ckpt")
     options = ["--stats", "wads", "--data", "rehearse3d", "--out", out]
     outcome = succeed("import-weights", "outdet", "published.pt", *options)
@@ -68,9 +66,7 @@ def training_checkpoint(model: SalsaNext) -> dict[str, object]:
     }
 
 
-def test_a_checkpoint_as_salsanext_saves_it_comes_with_its_grid(
-    succeed, random_salsanext: SalsaNext
-) -> None:
+def test_a_checkpoint_as_salsanext_saves_it_comes_with_its_grid(succeed, random_salsanext) -> None:
     torch.save(training_checkpoint(random_salsanext), "valid_best")
     options = ["--stats", "kitti", "--grid", "rehearse3d", "--out", "model.ckpt"]
     succeed("import-weights", "salsanext", "valid_best", *options)
@@ -94,12 +90,7 @@ def test_a_checkpoint_as_salsanext_saves_it_comes_with_its_grid(
     ],
 )
 def test_what_cannot_be_imported_is_one_line_and_exit_code_2(
-    refused,
-    published: dict[str, Tensor],
-    network: str,
-    weights: str,
-    options: tuple[str, ...],
-    reason: str,
+    refused, published, network, weights, options, reason
 ) -> None:
     torch.save({key: tensor for key, tensor in published.items() if key != "fc.bias"}, "other.pt")
     line = refused("import-weights", network, weights, "--out", "out.ckpt", "--stats", *options)

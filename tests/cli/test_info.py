@@ -14,7 +14,6 @@ from derain.export.runtime import Derainer
 from derain.files import read_scan, write_scan
 from derain.files.labels import write_labels
 from derain.models.checkpoint import save_model
-from derain.models.outdet import OutDet
 from derain.scan import Scan
 from derain.views.grid_fit import fit_grid
 from derain.views.spherical_grid import grid_of
@@ -23,7 +22,7 @@ from ..two_returns import Recording
 
 
 @pytest.fixture
-def scan(tmp_path: Path) -> Path:
+def scan(tmp_path) -> Path:
     """Six rows: four points at three positions, one row of NaN and one at the origin."""
     rows = np.array(
         [
@@ -41,9 +40,7 @@ def scan(tmp_path: Path) -> Path:
     return path
 
 
-def test_one_grid_is_fitted_to_all_scans_and_can_be_configured(
-    succeed, facts_of, tmp_path: Path
-) -> None:
+def test_one_grid_is_fitted_to_all_scans_and_can_be_configured(succeed, facts_of, tmp_path) -> None:
     paths = [tmp_path / f"{seed}.bin" for seed in range(2)]
     for seed, path in enumerate(paths):
         scene(2000, seed).tofile(path)
@@ -53,7 +50,7 @@ def test_one_grid_is_fitted_to_all_scans_and_can_be_configured(
     assert facts_of("--grid", *paths) == facts_of("--grid", tmp_path) == printed
 
 
-def test_a_scan_is_described_by_its_valid_points(facts_of, scan: Path) -> None:
+def test_a_scan_is_described_by_its_valid_points(facts_of, scan) -> None:
     facts = facts_of(scan)
     fit = fit_grid([read_scan(scan)]).as_dict()
     assert facts.pop("fitted grid") == {name: fit[name] for name in fit if name != "grid"}
@@ -75,7 +72,7 @@ def test_a_scan_is_described_by_its_valid_points(facts_of, scan: Path) -> None:
     }
 
 
-def test_the_text_holds_the_same_line_by_line(succeed, scan: Path) -> None:
+def test_the_text_holds_the_same_line_by_line(succeed, scan) -> None:
     outcome = succeed("info", scan)
     lines = outcome.out.splitlines()
     assert lines[0] == str(scan)
@@ -84,7 +81,7 @@ def test_the_text_holds_the_same_line_by_line(succeed, scan: Path) -> None:
     assert "  fields: x float32, y float32, z float32, intensity float32" in lines
 
 
-def test_labels_are_counted_by_class(succeed, facts_of, tmp_path: Path) -> None:
+def test_labels_are_counted_by_class(succeed, facts_of, tmp_path) -> None:
     path = tmp_path / "scan.label"
     write_labels(path, np.array([110, 0, 110, 40]), np.array([7, 0, 8, 0]))
     facts = facts_of(path)
@@ -93,7 +90,7 @@ def test_labels_are_counted_by_class(succeed, facts_of, tmp_path: Path) -> None:
     assert "  points by class id: 0 1, 40 1, 110 2" in succeed("info", path).out.splitlines()
 
 
-def test_a_model_holds_its_spec_proof_and_versions(succeed, facts_of, onnx_model: Path) -> None:
+def test_a_model_holds_its_spec_proof_and_versions(succeed, facts_of, onnx_model) -> None:
     assert facts_of(onnx_model) == {"file": str(onnx_model), **Derainer(onnx_model).metadata}
     text = succeed("info", onnx_model).out
     for fact in ("network: outdet", "data: WADS", "licence: CC BY-NC-SA 4.0", "flipped: 0"):
@@ -101,7 +98,7 @@ def test_a_model_holds_its_spec_proof_and_versions(succeed, facts_of, onnx_model
 
 
 def test_scans_of_a_training_are_counted_in_the_text_and_named_in_json(
-    succeed, facts_of, random_outdet: OutDet, tmp_path: Path
+    succeed, facts_of, random_outdet, tmp_path
 ) -> None:
     model, path = deepcopy(random_outdet), tmp_path / "model.ckpt"
     training = {"sequences": [f"{n:04}" for n in range(2000)]}
@@ -116,7 +113,7 @@ def test_scans_of_a_training_are_counted_in_the_text_and_named_in_json(
 
 
 def test_a_file_that_cannot_be_read_keeps_no_other_from_being_described(
-    run_derain, scan: Path, tmp_path: Path
+    run_derain, scan, tmp_path
 ) -> None:
     (tmp_path / "cut.bin").write_bytes(b"12345")
     outcome = run_derain("info", "--json", "none.bin", scan, tmp_path / "cut.bin", scan)
@@ -129,7 +126,7 @@ def test_a_file_that_cannot_be_read_keeps_no_other_from_being_described(
 
 
 @pytest.fixture
-def recording(tmp_path: Path) -> Recording:
+def recording(tmp_path) -> Recording:
     """A labelled scan of a sensor of two returns: the nearer of two is snow on every other ray."""
     recording = Recording(0)
     _, nearer, _ = recording.truth()
@@ -140,7 +137,7 @@ def recording(tmp_path: Path) -> Recording:
 
 
 def test_rays_of_two_returns_are_counted_and_by_labels_what_lies_behind_rain(
-    facts_of, tmp_path: Path, recording: Recording
+    facts_of, tmp_path, recording
 ) -> None:
     _, nearer, _ = recording.truth()
     rays, dual = len(np.unique(recording.ray)), int(nearer.sum())
@@ -163,7 +160,7 @@ def test_rays_of_two_returns_are_counted_and_by_labels_what_lies_behind_rain(
     assert facts_of(*arguments)["returns"] == counted
 
 
-def test_a_scan_without_a_valid_point_has_no_grid(facts_of, refused, tmp_path: Path) -> None:
+def test_a_scan_without_a_valid_point_has_no_grid(facts_of, refused, tmp_path) -> None:
     np.full((10, 4), np.nan, np.float32).tofile(tmp_path / "nothing.bin")
     assert facts_of(tmp_path / "nothing.bin")["fitted grid"] == "none"
     line = refused("info", "--grid", tmp_path / "nothing.bin")
@@ -180,7 +177,7 @@ def test_a_scan_without_a_valid_point_has_no_grid(facts_of, refused, tmp_path: P
     ],
 )
 def test_a_file_that_cannot_be_read_is_one_line_and_exit_code_2(
-    refused, tmp_path: Path, name: str, content: bytes, reason: str
+    refused, tmp_path, name, content, reason
 ) -> None:
     path = tmp_path / name
     path.write_bytes(content)

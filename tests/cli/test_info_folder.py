@@ -14,7 +14,7 @@ from derain.simulation.manifest import MAKER
 
 
 @pytest.fixture
-def data_set(tmp_path: Path) -> Path:
+def data_set(tmp_path) -> Path:
     """Three sequences of two scans of 100 points: in 000 and 002 it rains, ten drops a scan."""
     root = tmp_path / "data"
     for name in ("000", "001", "002"):
@@ -36,7 +36,7 @@ def some(by_class: dict[str, float]) -> dict[str, float]:
     return {name: number for name, number in by_class.items() if number}
 
 
-def test_a_data_set_is_one_object_for_programs(facts_of, data_set: Path) -> None:
+def test_a_data_set_is_one_object_for_programs(facts_of, data_set) -> None:
     facts = facts_of(data_set)
     assert facts["folder"] == str(data_set)
     assert facts["layout"] == ["lidar_radar_pcd", "lidar_radar_labels"]
@@ -50,7 +50,7 @@ def test_a_data_set_is_one_object_for_programs(facts_of, data_set: Path) -> None
     assert some(facts["by_rain_rate"]["25"]["class_share"]) == {"rain": 0.1, "road": 0.9}
 
 
-def test_the_table_has_a_line_a_class_and_a_column_a_rate(run_derain, data_set: Path) -> None:
+def test_the_table_has_a_line_a_class_and_a_column_a_rate(run_derain, data_set) -> None:
     head, *lines = run_derain("info", data_set).out.splitlines()
     assert str(data_set) in head
     assert "simulated rain" in head
@@ -65,7 +65,7 @@ def test_the_table_has_a_line_a_class_and_a_column_a_rate(run_derain, data_set: 
 
 
 def test_units_are_counted_as_one_process_counts_and_not_again(
-    run_derain, succeed, data_set: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run_derain, succeed, data_set, tmp_path, monkeypatch
 ) -> None:
     table = succeed("info", data_set).out
     assert succeed("info", data_set, "--workers", 2).out == table
@@ -90,7 +90,7 @@ def test_units_are_counted_as_one_process_counts_and_not_again(
 
 
 def test_a_unit_that_cannot_be_counted_does_not_stop_the_others_of_a_folder_of_records(
-    run_derain, succeed, data_set: Path, tmp_path: Path
+    run_derain, succeed, data_set, tmp_path
 ) -> None:
     scan = data_set / "sequences/000/lidar_radar_pcd/000001.bin"
     content = scan.read_bytes()
@@ -104,15 +104,13 @@ def test_a_unit_that_cannot_be_counted_does_not_stop_the_others_of_a_folder_of_r
     assert succeed(*command).out == succeed("info", data_set).out
 
 
-def test_records_are_of_one_folder_and_are_asked_for(
-    refused, data_set: Path, tmp_path: Path
-) -> None:
+def test_records_are_of_one_folder_and_are_asked_for(refused, data_set, tmp_path) -> None:
     assert "--out" in refused("info", data_set, data_set, "--out", tmp_path / "counts")
     assert "--out" in refused("info", data_set, "--shard", "0/2")
     assert "--out" in refused("info", data_set, "--anew")
 
 
-def test_a_card_without_labels_to_explain_is_warned_of(run_derain, tmp_path: Path) -> None:
+def test_a_card_without_labels_to_explain_is_warned_of(run_derain, tmp_path) -> None:
     (tmp_path / "scans").mkdir()
     scene(50).tofile(tmp_path / "scans/0.bin")
     write_labels(tmp_path / "truth/0.label", np.full(50, 110))
@@ -124,9 +122,7 @@ def test_a_card_without_labels_to_explain_is_warned_of(run_derain, tmp_path: Pat
     assert "falling-snow" in outcome.out
 
 
-def test_the_card_is_named_or_else_chosen_by_the_layout(
-    facts_of, data_set: Path, tmp_path: Path
-) -> None:
+def test_the_card_is_named_or_else_chosen_by_the_layout(facts_of, data_set, tmp_path) -> None:
     card = tmp_path / "mine.yaml"
     card.write_text("name: mine\nclasses: {3: wet, 7: grey}\nrain: [3]")
     facts = facts_of(data_set, "--card", card)
@@ -137,7 +133,7 @@ def test_the_card_is_named_or_else_chosen_by_the_layout(
     assert (facts["points"], facts["labelled_points"]) == (600, 0)
 
 
-def test_scans_without_labels_and_card_are_counted(succeed, facts_of, tmp_path: Path) -> None:
+def test_scans_without_labels_and_card_are_counted(succeed, facts_of, tmp_path) -> None:
     scene(100).tofile(tmp_path / "0.bin")
     facts = facts_of(tmp_path)
     assert (facts["scans"], facts["points"], facts["class_share"]) == (1, 100, {})
@@ -145,7 +141,7 @@ def test_scans_without_labels_and_card_are_counted(succeed, facts_of, tmp_path: 
     assert "no data card" in succeed("info", tmp_path).out
 
 
-def test_a_picture_shows_one_folder_alone(refused, data_set: Path, tmp_path: Path) -> None:
+def test_a_picture_shows_one_folder_alone(refused, data_set, tmp_path) -> None:
     for named in ([__file__], [data_set, data_set], ["--grid", data_set]):
         line = refused("info", *named, "--picture", tmp_path / "statistics.png")
         assert "--picture: shows one folder's statistics" in line
@@ -159,15 +155,13 @@ def test_a_picture_shows_one_folder_alone(refused, data_set: Path, tmp_path: Pat
         (["--card", "none"], "no such data card"),
     ],
 )
-def test_what_cannot_be_meant_is_one_line(
-    refused, data_set: Path, arguments: list[str], reason: str
-) -> None:
+def test_what_cannot_be_meant_is_one_line(refused, data_set, arguments, reason) -> None:
     assert reason in refused("info", data_set, *arguments)
 
 
 @pytest.mark.parametrize(("rain", "doubted"), [(110, False), (70, True)], ids=["WADS", "KITTI"])
 def test_a_card_that_rests_on_common_names_of_folders_is_a_guess(
-    succeed, facts_of, tmp_path: Path, rain: int, doubted: bool
+    succeed, facts_of, tmp_path, rain, doubted
 ) -> None:
     scan = tmp_path / "sequences/00/velodyne/000000.bin"
     scan.parent.mkdir(parents=True)

@@ -11,7 +11,7 @@ ONCE = "--methods ssr dror --timed 1 --repeats 1"
 
 
 @pytest.fixture(autouse=True)
-def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, write_labelled) -> None:
+def small(tmp_path, monkeypatch, write_labelled) -> None:
     """Three labelled scans, and the same with intensities of a 1024th, which float32 holds."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(scan_pictures, "save", lambda figure, path: None)
@@ -33,9 +33,7 @@ def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, write_labelled) -> No
         ("view {scans}/0.bin --methods ssr --out {out}.png", "ssr: ", 1),
     ],
 )
-def test_another_unit_is_warned_of_once_and_can_be_scaled(
-    succeed, command: str, title: str, scans: int
-) -> None:
+def test_another_unit_is_warned_of_once_and_can_be_scaled(succeed, command, title, scans) -> None:
     def said(folder: str, *options: str) -> list[str]:
         return succeed(*command.format(scans=folder, out=f"of_{folder}").split(), *options).said
 

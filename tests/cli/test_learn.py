@@ -30,7 +30,7 @@ QUICK = ("--teacher", "dror", "--epochs", "1")
 
 
 @pytest.fixture(autouse=True)
-def _quickly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _quickly(tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     # The whole proof has a test of its own.
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
@@ -52,9 +52,7 @@ def weights(model: Path) -> str:
 
 
 @pytest.mark.usefixtures("one_block")
-def test_a_recording_becomes_a_model_and_a_report_whatever_its_labels(
-    succeed, recording: Path
-) -> None:
+def test_a_recording_becomes_a_model_and_a_report_whatever_its_labels(succeed, recording) -> None:
     lightning.seed_everything(0)
     start = OutDet(neighbours=4, channels=("range",))
     start.adopt(start.spec_for(load_card("wads")))
@@ -114,7 +112,7 @@ def shows_teacher_and_student(found: ReadBack, recording: Path, work: Path) -> N
     assert [number for number, text in captions.items() if ", held out" in text[0]] == [4]
 
 
-def test_a_folder_of_something_else_is_not_cleared(refused, recording: Path) -> None:
+def test_a_folder_of_something_else_is_not_cleared(refused, recording) -> None:
     mine = Path("mine/notes.txt")
     mine.parent.mkdir()
     mine.touch()
@@ -132,7 +130,7 @@ def test_a_folder_of_something_else_is_not_cleared(refused, recording: Path) -> 
     ],
 )
 def test_what_cannot_be_learnt_from_is_refused_and_leaves_no_model(
-    run_derain, recording: Path, scans: int, options: tuple[str, ...], names: str
+    run_derain, recording, scans, options, names
 ) -> None:
     paths = sorted(recording.iterdir())[:scans]
     outcome = run_derain("learn", *paths, "--out", "model.onnx", *options)
@@ -142,7 +140,7 @@ def test_what_cannot_be_learnt_from_is_refused_and_leaves_no_model(
 
 
 def test_a_recording_of_which_too_few_scans_can_be_labelled_is_refused_with_the_reason(
-    recording: Path, monkeypatch: pytest.MonkeyPatch, run_derain
+    recording, monkeypatch, run_derain
 ) -> None:
     def teach(*_: object, **options: object) -> TeachResults:
         warn("2.bin: not to be trusted: it is of another place")
@@ -156,7 +154,7 @@ def test_a_recording_of_which_too_few_scans_can_be_labelled_is_refused_with_the_
 
 
 def test_a_clean_recording_is_refused_with_a_report_of_it(
-    run_derain, recording: Path, monkeypatch: pytest.MonkeyPatch
+    run_derain, recording, monkeypatch
 ) -> None:
     # A recording of which a filter finds nothing to be rain is hard to make up.
     monkeypatch.setattr(learn, "LEAST_RAIN", 1.0)

@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -27,7 +26,7 @@ def test_help_starts_with_examples_and_names_every_command(succeed) -> None:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_the_help_of_a_command_starts_with_examples_of_it(succeed, command: str) -> None:
+def test_the_help_of_a_command_starts_with_examples_of_it(succeed, command) -> None:
     outcome = succeed(command, "--help")
     assert f"\n  derain {command}" in outcome.out.split("options:")[0]
     assert max(map(len, str(module_of(command).__doc__).splitlines())) <= 100
@@ -57,7 +56,7 @@ def test_a_command_that_cannot_be_understood_exits_with_2(refused, arguments) ->
     ],
 )
 def test_a_model_is_written_only_under_a_suffix_that_it_is_known_by(
-    refused, tmp_path: Path, arguments: list[str], suffix: str
+    refused, tmp_path, arguments, suffix
 ) -> None:
     line = refused(*arguments, "--out", tmp_path / "model.txt")
     assert f"--out: {tmp_path / 'model.txt'} does not end in {suffix}" in line

@@ -27,7 +27,7 @@ TOO_LONG = 300 * "x"
 
 
 @pytest.fixture
-def scans(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+def scans(tmp_path, monkeypatch) -> list[Path]:
     """Labelled scans of those names, in a folder of such a name."""
     monkeypatch.chdir(tmp_path)
     folder = Path(os.fsdecode(b"dir\xff\x1b[1m"))
@@ -52,9 +52,7 @@ def assert_fit_for_a_terminal(text: str) -> None:
         ["info", "{scans}", "--columns", "x,y,z,intensity"],
     ],
 )
-def test_odd_names_are_fit_for_a_terminal_and_whole_in_json(
-    succeed, scans: list[Path], command: list[str]
-) -> None:
+def test_odd_names_are_fit_for_a_terminal_and_whole_in_json(succeed, scans, command) -> None:
     given = {"{dir}": [scans[0].parent], "{scans}": scans}
     words = [part for word in command for part in given.get(word, [word])]
     outcome = succeed(*words)
@@ -67,7 +65,7 @@ def test_odd_names_are_fit_for_a_terminal_and_whole_in_json(
     assert written in (set(), {path.name for path in scans})
 
 
-def test_what_is_written_of_odd_names_is_text(succeed, scans: list[Path]) -> None:
+def test_what_is_written_of_odd_names_is_text(succeed, scans) -> None:
     data = ["--data", scans[0].parent, "--card", "wads"]
     title = os.fsdecode(b"\xfftitle\x1b[1m=dror")
     once = ["--limit", "1", "--timed", "1", "--repeats", "1"]
@@ -86,7 +84,7 @@ def test_a_command_line_of_odd_names_is_one_line_of_text() -> None:
 
 
 @pytest.mark.parametrize("number", [1, 4])
-def test_odd_names_are_drawn(succeed, scans: list[Path], number: int) -> None:
+def test_odd_names_are_drawn(succeed, scans, number) -> None:
     picture = Path(f"{scans[number].stem}.png")
     outcome = succeed("view", scans[number], "--methods", "dror", "--out", picture)
     assert_fit_for_a_terminal(outcome.out)
@@ -111,16 +109,14 @@ def test_odd_names_are_drawn(succeed, scans: list[Path], number: int) -> None:
     ],
     ids=" ".join,
 )
-def test_a_name_that_is_too_long_is_one_line(
-    refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: list[str]
-) -> None:
+def test_a_name_that_is_too_long_is_one_line(refused, tmp_path, monkeypatch, command) -> None:
     monkeypatch.chdir(tmp_path)
     scene(300).tofile("a.bin")
     assert TOO_LONG in refused(*(word.format(long=TOO_LONG) for word in command))
 
 
 def test_a_scan_whose_labels_could_have_no_name_does_not_stop_the_others(
-    run_derain, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run_derain, tmp_path, monkeypatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("scans").mkdir()
@@ -141,9 +137,7 @@ def test_a_scan_whose_labels_could_have_no_name_does_not_stop_the_others(
         (MemoryError(), "memory: it is full."),
     ],
 )
-def test_whatever_the_system_refuses_is_one_line(
-    run_derain, monkeypatch: pytest.MonkeyPatch, error: Exception, line: str
-) -> None:
+def test_whatever_the_system_refuses_is_one_line(run_derain, monkeypatch, error, line) -> None:
     def refused(arguments: object) -> int:
         raise error
 

@@ -36,19 +36,19 @@ def write_recording(folder: Path, scans: int, step: np.ndarray = STEP) -> Path:
 
 
 @pytest.fixture
-def recording(tmp_path: Path) -> Path:
+def recording(tmp_path) -> Path:
     return write_recording(tmp_path / "hall/velodyne", 4)
 
 
 @pytest.fixture
-def apart(tmp_path: Path) -> Path:
+def apart(tmp_path) -> Path:
     """A recording of scans that have nothing in common."""
     for number in range(3):
         write_scan(tmp_path / f"apart/velodyne/{number}.bin", Scan.of(scene(300, seed=number)))
     return tmp_path / "apart/velodyne"
 
 
-def test_poses_are_written_and_found_beside_the_scans(run_derain, recording: Path) -> None:
+def test_poses_are_written_and_found_beside_the_scans(run_derain, recording) -> None:
     out = recording.parent / "poses.txt"
     outcome = run_derain("odometry", recording, "--out", out)
     assert (outcome.code, outcome.err) == (0, "")
@@ -64,7 +64,7 @@ def test_poses_are_written_and_found_beside_the_scans(run_derain, recording: Pat
     assert {path.name for path in recording.parent.iterdir()} == {"velodyne", "poses.txt"}
 
 
-def test_json_is_an_object_a_scan(run_derain, recording: Path, tmp_path: Path) -> None:
+def test_json_is_an_object_a_scan(run_derain, recording, tmp_path) -> None:
     outcome = run_derain("odometry", recording, "--out", tmp_path / "poses.txt", "--json")
     facts = [json.loads(line) for line in outcome.out.splitlines()]
     assert [each["trusted"] for each in facts] == 4 * [True]
@@ -77,9 +77,7 @@ def test_json_is_an_object_a_scan(run_derain, recording: Path, tmp_path: Path) -
     assert "path 2.7 m" in outcome.err
 
 
-def test_poses_by_time_are_those_of_the_scans_times(
-    succeed, recording: Path, tmp_path: Path
-) -> None:
+def test_poses_by_time_are_those_of_the_scans_times(succeed, recording, tmp_path) -> None:
     (recording.parent / "times.txt").write_text("5.0\n5.1\n5.2\n5.3\n")
     out = tmp_path / "drive.tum"
     outcome = succeed("odometry", recording, "--out", out, "--format", "tum")
@@ -97,9 +95,7 @@ def test_poses_by_time_are_those_of_the_scans_times(
         ("0\nsoon\n2\n3\n", "times.txt: line 2 is not 1 number"),
     ],
 )
-def test_poses_by_time_need_times_that_ascend(
-    refused, recording: Path, tmp_path: Path, times: str | None, reason: str
-) -> None:
+def test_poses_by_time_need_times_that_ascend(refused, recording, tmp_path, times, reason) -> None:
     if times is not None:
         (recording.parent / "times.txt").write_text(times)
     out = tmp_path / "drive.tum"
@@ -107,16 +103,14 @@ def test_poses_by_time_need_times_that_ascend(
     assert not out.exists()
 
 
-def test_one_scan_has_the_identity_and_a_note(succeed, recording: Path, tmp_path: Path) -> None:
+def test_one_scan_has_the_identity_and_a_note(succeed, recording, tmp_path) -> None:
     out = tmp_path / "poses.txt"
     outcome = succeed("odometry", recording / "000000.bin", "--out", out)
     assert "1 scan shows no motion" in outcome.out
     np.testing.assert_array_equal(read_trajectory(out).poses, np.eye(4)[None])
 
 
-def test_scans_that_fail_are_named_and_the_rest_is_done(
-    run_derain, recording: Path, tmp_path: Path
-) -> None:
+def test_scans_that_fail_are_named_and_the_rest_is_done(run_derain, recording, tmp_path) -> None:
     (recording / "000001.bin").write_bytes(b"damaged")
     (recording / "000004.bin").symlink_to(recording / "000000.bin")
     out = tmp_path / "poses.txt"
@@ -135,7 +129,7 @@ def test_scans_that_fail_are_named_and_the_rest_is_done(
 
 
 def test_several_recordings_are_a_folder_of_files_but_of_those_that_fail(
-    run_derain, recording: Path, apart: Path, tmp_path: Path
+    run_derain, recording, apart, tmp_path
 ) -> None:
     other = write_recording(tmp_path / "other/velodyne", 2, -STEP)
     out = tmp_path / "poses"
@@ -148,7 +142,7 @@ def test_several_recordings_are_a_folder_of_files_but_of_those_that_fail(
     np.testing.assert_allclose(found[1, :3, 3], -STEP, atol=0.05)
 
 
-def test_recordings_of_one_name_are_refused(refused, recording: Path, tmp_path: Path) -> None:
+def test_recordings_of_one_name_are_refused(refused, recording, tmp_path) -> None:
     namesake = write_recording(tmp_path / "other/hall/velodyne", 1)
     line = refused("odometry", recording, namesake, "--out", tmp_path / "twice")
     assert "another recording is called hall too" in line
@@ -164,9 +158,7 @@ def test_recordings_of_one_name_are_refused(refused, recording: Path, tmp_path: 
         ("velodyne/000001.bin", "is one of the scans or their labels"),
     ],
 )
-def test_what_came_with_the_scans_is_not_overwritten(
-    refused, recording: Path, name: str, reason: str
-) -> None:
+def test_what_came_with_the_scans_is_not_overwritten(refused, recording, name, reason) -> None:
     out = recording.parent / name
     if not out.exists():
         out.write_text("precious")
@@ -175,7 +167,7 @@ def test_what_came_with_the_scans_is_not_overwritten(
     assert out.read_bytes() == before
 
 
-def test_poses_are_replaced_on_request(succeed, recording: Path) -> None:
+def test_poses_are_replaced_on_request(succeed, recording) -> None:
     out = recording.parent / "poses.txt"
     out.write_text("damaged")
     succeed("odometry", recording, "--out", out, "--replace")

@@ -39,9 +39,7 @@ def checked_options() -> Iterator[Any]:
 
 
 @pytest.mark.parametrize(("command", "option", "values"), list(checked_options()))
-def test_a_value_that_an_option_cannot_have_is_refused_in_words(
-    command: str, option: str, values: int
-) -> None:
+def test_a_value_that_an_option_cannot_have_is_refused_in_words(command, option, values) -> None:
     with pytest.raises(InputError) as refusal:
         parser_of(command).parse_args([option, *["a:b"] * values])
     assert refusal.value.subject == option
@@ -50,7 +48,7 @@ def test_a_value_that_an_option_cannot_have_is_refused_in_words(
 
 
 @pytest.fixture
-def beginner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def beginner(tmp_path, monkeypatch) -> None:
     """A working folder with what a beginner has."""
     monkeypatch.chdir(tmp_path)
     for folder in ("scans", "empty", "mixed", "drive/velodyne", "drive/labels"):
@@ -97,9 +95,7 @@ def beginner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ),
     ],
 )
-def test_a_slip_is_one_line_that_names_what_is_meant(
-    refused, words: str, named: tuple[str, ...]
-) -> None:
+def test_a_slip_is_one_line_that_names_what_is_meant(refused, words, named) -> None:
     line = refused(*words.split())
     places = [line.index(part) for part in named]
     assert places == sorted(places)
@@ -115,9 +111,7 @@ def test_a_slip_is_one_line_that_names_what_is_meant(
         ("run crf scans --columns x,y,z,_ --out o", 0, ("scans/0.bin", "no intensity", "dror")),
     ],
 )
-def test_what_is_odd_about_one_file_is_named(
-    run_derain, words: str, code: int, named: tuple[str, ...]
-) -> None:
+def test_what_is_odd_about_one_file_is_named(run_derain, words, code, named) -> None:
     outcome = run_derain(*words.split())
     assert outcome.code == code
     (line,) = [line for line in outcome.err.splitlines() if named[1] in line]
@@ -127,5 +121,5 @@ def test_what_is_odd_about_one_file_is_named(
 @pytest.mark.parametrize(
     "words", [["run", "dror", "s", "--ou", "o"], ["run", "--out", "o", "--", "--s"]]
 )
-def test_an_abbreviated_option_and_a_name_after_two_dashes_are_understood(words: list[str]) -> None:
+def test_an_abbreviated_option_and_a_name_after_two_dashes_are_understood(words) -> None:
     assert parser_of(words[0]).parse_args(words[1:]).out.name == "o"

@@ -18,7 +18,7 @@ from derain.views.spherical_grid import SphericalGrid
 
 
 @pytest.fixture
-def scans(tmp_path: Path) -> Path:
+def scans(tmp_path) -> Path:
     """A folder of three scans of 100, 200 and 300 points."""
     folder = tmp_path / "scans"
     folder.mkdir()
@@ -40,9 +40,7 @@ def names(folder: Path) -> list[str]:
     return sorted(str(f.relative_to(folder)) for f in folder.rglob("*") if f.is_file())
 
 
-def test_scans_get_their_labels_and_lose_their_rain(
-    succeed, onnx_model: Path, scans: Path, tmp_path: Path
-) -> None:
+def test_scans_get_their_labels_and_lose_their_rain(succeed, onnx_model, scans, tmp_path) -> None:
     single, out = tmp_path / "single.npy", tmp_path / "out"
     np.save(single, scene(50))
     outcome = succeed("run", onnx_model, scans, single, "--out", out)
@@ -59,9 +57,7 @@ def test_scans_get_their_labels_and_lose_their_rain(
     assert lines[4].startswith("4 scans: 650 points, ")
 
 
-def test_json_is_one_object_a_scan_and_nothing_else(
-    succeed, onnx_model: Path, scans: Path, tmp_path: Path
-) -> None:
+def test_json_is_one_object_a_scan_and_nothing_else(succeed, onnx_model, scans, tmp_path) -> None:
     points = scene(80)
     points[:7] = np.nan
     points.tofile(scans / "with_nan.bin")
@@ -91,7 +87,7 @@ def test_json_is_one_object_a_scan_and_nothing_else(
     ids=lambda command: command[0],
 )
 def test_damaged_records_break_no_command_that_needs_none(
-    succeed, scans: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: list[str]
+    succeed, scans, tmp_path, monkeypatch, command
 ) -> None:
     monkeypatch.chdir(tmp_path)
     for record in ("poses.txt", "times.txt", "calib.txt", "scans/metadata.csv"):
@@ -100,7 +96,7 @@ def test_damaged_records_break_no_command_that_needs_none(
 
 
 def test_nothing_is_left_where_the_output_cannot_be_written(
-    refused, onnx_model: Path, scans: Path, tmp_path: Path
+    refused, onnx_model, scans, tmp_path
 ) -> None:
     (tmp_path / "file").write_text("in the way")
     before = names(tmp_path)
@@ -126,12 +122,7 @@ def test_nothing_is_left_where_the_output_cannot_be_written(
     ],
 )
 def test_what_cannot_be_used_is_refused_before_any_work(
-    refused,
-    onnx_model: Path,
-    scans: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    arguments: list[str],
-    reason: str,
+    refused, onnx_model, scans, monkeypatch, arguments, reason
 ) -> None:
     monkeypatch.chdir(scans.parent)
     Path("dsor.yaml").write_text("method: dsor\nlimit: 3\n")
@@ -142,7 +133,7 @@ def test_what_cannot_be_used_is_refused_before_any_work(
     assert not Path("out").exists()
 
 
-def test_parameters_come_from_a_file_and_one_by_one(succeed, tmp_path: Path) -> None:
+def test_parameters_come_from_a_file_and_one_by_one(succeed, tmp_path) -> None:
     scan, tuned, out = tmp_path / "scan.bin", tmp_path / "best.yaml", tmp_path / "out"
     scene(400).tofile(scan)
     tuned.write_text("method: dsor\nneighbours: 4\nrange_multiplier: 0.02\n")
@@ -180,7 +171,7 @@ def write_named(path: Path) -> Scan:
 
 @pytest.mark.parametrize("suffix", [".pcd", ".npz", ".csv", ".las"])
 def test_cleaned_and_removed_are_the_scan_with_the_probability_as_a_column(
-    succeed, onnx_model: Path, tmp_path: Path, suffix: str
+    succeed, onnx_model, tmp_path, suffix
 ) -> None:
     path, out, removed = tmp_path / f"scan{suffix}", tmp_path / "out", tmp_path / "removed"
     scan = write_named(path)
@@ -199,9 +190,7 @@ def test_cleaned_and_removed_are_the_scan_with_the_probability_as_a_column(
             np.testing.assert_array_equal(values, scan.fields[name][rows], strict=True)
 
 
-def test_a_scan_that_would_lose_too_much_is_left_whole(
-    run_derain, tmp_path: Path, scans: Path
-) -> None:
+def test_a_scan_that_would_lose_too_much_is_left_whole(run_derain, tmp_path, scans) -> None:
     spread = scene(200) * np.array([1e3, 1e3, 1e3, 1], np.float32)
     spread.tofile(scans / "000002.bin")
     out = tmp_path / "out"
@@ -215,7 +204,7 @@ def test_a_scan_that_would_lose_too_much_is_left_whole(
 
 
 def test_a_scan_is_projected_once_and_points_outside_the_grid_are_warned_of(
-    succeed, salsanext_onnx: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    succeed, salsanext_onnx, tmp_path, monkeypatch
 ) -> None:
     points = scene(400)
     points[:100, 2] = 80.0  # above the grid

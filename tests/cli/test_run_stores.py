@@ -28,7 +28,7 @@ def server() -> Iterator[None]:
 
 
 @pytest.fixture
-def s3(server: None, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+def s3(server, monkeypatch) -> Iterator[Any]:
     """The file system of a server that is empty, and works unless it is made to fail."""
     monkeypatch.setattr("derain.stores.objects.WAITS", (0.01,) * 20)
     files = file_system()
@@ -39,7 +39,7 @@ def s3(server: None, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
 
 
 @pytest.fixture
-def drive(tmp_path: Path) -> Path:
+def drive(tmp_path) -> Path:
     """A recording with poses."""
     folder = tmp_path / "drive"
     folder.mkdir()
@@ -60,7 +60,7 @@ def in_store(s3: Any, folder: str) -> dict[str, bytes]:
 
 
 def test_a_store_that_fails_gives_the_bytes_of_a_folder_and_a_second_run_does_nothing(
-    succeed, s3: Any, drive: Path, tmp_path: Path
+    succeed, s3, drive, tmp_path
 ) -> None:
     s3.put(f"{drive}/", f"{BUCKET}/drive/", recursive=True)
     succeed("run", "persistence", drive, "--out", tmp_path / "out", *OPTIONS)
@@ -77,9 +77,7 @@ def test_a_store_that_fails_gives_the_bytes_of_a_folder_and_a_second_run_does_no
     assert "3 of 3 units done" in succeed("status", "s3://drives/out").out
 
 
-def test_processes_in_another_folder_do_what_is_in_a_store(
-    s3: Any, drive: Path, tmp_path: Path
-) -> None:
+def test_processes_in_another_folder_do_what_is_in_a_store(s3, drive, tmp_path) -> None:
     s3.put(str(drive), f"{BUCKET}/drive", recursive=True)
     method = derain.FilterDerainer(derain.DROR(), threads=1)
     elsewhere = {"initializer": os.chdir, "initargs": (tmp_path,)}
@@ -92,7 +90,7 @@ def test_processes_in_another_folder_do_what_is_in_a_store(
 
 @pytest.mark.parametrize(("storage", "poses"), [("mcap", "poses.txt"), ("ros1", "odometry")])
 def test_a_bag_of_a_store_is_cleaned_as_one_of_a_folder(
-    succeed, s3: Any, drive: Path, tmp_path: Path, storage: str, poses: str
+    succeed, s3, drive, tmp_path, storage, poses
 ) -> None:
     (tmp_path / "bags").mkdir()
     small_bag(tmp_path / "bags", storage)
@@ -123,9 +121,7 @@ def rows_without_names(table: Path) -> list[list[str]]:
     return rows
 
 
-def test_results_that_were_removed_or_replaced_are_written_again(
-    succeed, s3: Any, drive: Path
-) -> None:
+def test_results_that_were_removed_or_replaced_are_written_again(succeed, s3, drive) -> None:
     s3.put(f"{drive}/", f"{BUCKET}/drive/", recursive=True)
     command = ("run", "dror", "s3://drives/drive/", "--out", "s3://drives/out", *OPTIONS)
     succeed(*command)
@@ -138,7 +134,7 @@ def test_results_that_were_removed_or_replaced_are_written_again(
 
 
 def test_what_cannot_be_read_is_listed_and_done_by_the_next_run(
-    run_derain, succeed, s3: Any, drive: Path, monkeypatch: pytest.MonkeyPatch
+    run_derain, succeed, s3, drive, monkeypatch
 ) -> None:
     s3.put(f"{drive}/", f"{BUCKET}/drive/", recursive=True)
     command = ("run", "dror", "s3://drives/drive/", "--out", "s3://drives/out", *OPTIONS)
@@ -177,7 +173,7 @@ def refusing(name: str) -> Any:
     ],
 )
 def test_what_cannot_be_done_is_refused_in_one_line(
-    refused, s3: Any, drive: Path, tmp_path: Path, scans: str, out: str, part: str
+    refused, s3, drive, tmp_path, scans, out, part
 ) -> None:
     small_bag(tmp_path / "bags", "mcap")
     s3.put(f"{drive}/", f"{BUCKET}/drive/", recursive=True)

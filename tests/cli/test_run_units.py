@@ -11,12 +11,12 @@ OPTIONS = ("--block", 2, "--most-removed", 1)
 
 
 @pytest.fixture
-def scans(tmp_path: Path) -> Path:
+def scans(tmp_path) -> Path:
     return write_scenes(tmp_path / "scans", *5 * [200])
 
 
 def test_a_run_of_more_scans_than_a_block_keeps_records_and_goes_on(
-    succeed, scans: Path, tmp_path: Path
+    succeed, scans, tmp_path
 ) -> None:
     out, table = tmp_path / "out", tmp_path / "weather.csv"
     command = ("run", "dror", scans, "--out", out, *OPTIONS, "--weather", table)
@@ -34,9 +34,7 @@ def test_a_run_of_more_scans_than_a_block_keeps_records_and_goes_on(
     assert table.read_text() == rows
 
 
-def test_a_run_of_few_scans_keeps_none_without_an_option(
-    succeed, scans: Path, tmp_path: Path
-) -> None:
+def test_a_run_of_few_scans_keeps_none_without_an_option(succeed, scans, tmp_path) -> None:
     out = tmp_path / "out"
     succeed("run", "dror", scans, "--out", out, "--most-removed", 1)
     assert not (out / ".derain").exists()
@@ -45,7 +43,7 @@ def test_a_run_of_few_scans_keeps_none_without_an_option(
 
 
 def test_other_options_are_refused_until_all_is_done_anew(
-    succeed, refused, scans: Path, tmp_path: Path
+    succeed, refused, scans, tmp_path
 ) -> None:
     out = tmp_path / "out"
     succeed("run", "dror", scans, "--out", out, *OPTIONS)
@@ -56,7 +54,7 @@ def test_other_options_are_refused_until_all_is_done_anew(
 
 
 def test_shares_are_those_of_a_slurm_array_and_the_status_names_what_is_missing(
-    run_derain, succeed, scans: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run_derain, succeed, scans, tmp_path, monkeypatch
 ) -> None:
     out = tmp_path / "out"
     monkeypatch.setenv("SLURM_ARRAY_TASK_MIN", "1")
@@ -78,7 +76,7 @@ def test_shares_are_those_of_a_slurm_array_and_the_status_names_what_is_missing(
     assert "3 of 3 units done, 0 failed, 0 missing" in succeed("status", out).out
 
 
-def test_options_that_exclude_each_other_are_refused(refused, scans: Path, tmp_path: Path) -> None:
+def test_options_that_exclude_each_other_are_refused(refused, scans, tmp_path) -> None:
     command = ("run", "dror", scans, "--out", tmp_path / "out")
     assert "--anew" in refused(*command, "--anew", "--shard", "0/2")
     assert "0 to 1" in refused(*command, "--shard", "2/2")

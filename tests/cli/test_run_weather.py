@@ -30,7 +30,7 @@ def wall(drops: int) -> NDArray[np.float32]:
 
 
 @pytest.fixture
-def recording(tmp_path: Path) -> Path:
+def recording(tmp_path) -> Path:
     """Six scans: drops in none of the first two, in the next two, and in none of the last."""
     folder = tmp_path / "recording"
     folder.mkdir()
@@ -62,9 +62,7 @@ def rounded(shares: NDArray[np.float64]) -> list[Any]:
 LEVELS = ("--warning", "40", "90", "--error", "5", "9", "--hold", "2")
 
 
-def test_json_holds_the_weather_of_the_written_labels(
-    succeed, recording: Path, tmp_path: Path
-) -> None:
+def test_json_holds_the_weather_of_the_written_labels(succeed, recording, tmp_path) -> None:
     out = tmp_path / "out"
     outcome = succeed("run", "dror", recording, "--out", out, "--json", *LEVELS)
     alarm = Alarm(Threshold(40, 90), Threshold(5, 9), hold=2)
@@ -92,7 +90,7 @@ def test_json_holds_the_weather_of_the_written_labels(
 
 @pytest.mark.parametrize("scans", [1, 6])
 def test_without_an_option_a_few_scans_are_enough_for_the_last_line(
-    run_derain, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scans: int
+    run_derain, recording, tmp_path, monkeypatch, scans
 ) -> None:
     for path in sorted(recording.iterdir())[scans:]:
         path.unlink()
@@ -115,7 +113,7 @@ def test_without_an_option_a_few_scans_are_enough_for_the_last_line(
     [("warning", 3, "the weather was at warning or worse in 2 of 6 scans"), ("error", 0, "")],
 )
 def test_bad_weather_can_be_known_by_the_exit_code_after_all_scans(
-    run_derain, recording: Path, tmp_path: Path, asked: str, code: int, told: str
+    run_derain, recording, tmp_path, asked, code, told
 ) -> None:
     out = tmp_path / "out"
     outcome = run_derain("run", "dror", recording, "--out", out, *LEVELS, "--fail-at", asked)
@@ -131,7 +129,7 @@ def test_bad_weather_can_be_known_by_the_exit_code_after_all_scans(
 
 
 def test_a_table_has_a_line_a_scan_and_nothing_where_nothing_is_known(
-    succeed, recording: Path, tmp_path: Path
+    succeed, recording, tmp_path
 ) -> None:
     out, table = tmp_path / "out", tmp_path / "tables/weather.csv"
     arguments = ("run", "dror", recording, "--out", out, *LEVELS)
@@ -156,7 +154,7 @@ def test_a_table_has_a_line_a_scan_and_nothing_where_nothing_is_known(
 
 
 def test_scans_that_are_no_recording_have_levels_and_no_alarm(
-    run_derain, recording: Path, tmp_path: Path
+    run_derain, recording, tmp_path
 ) -> None:
     for number, name in enumerate(("street", "bridge", "000900", "field", "park", "000100")):
         (recording / f"{number:06d}.bin").rename(recording / f"{name}.bin")
@@ -174,7 +172,7 @@ def test_scans_that_are_no_recording_have_levels_and_no_alarm(
     assert outcome.code == 3  # by the scans alone
 
 
-def test_a_table_takes_the_place_of_no_other_file(refused, recording: Path, tmp_path: Path) -> None:
+def test_a_table_takes_the_place_of_no_other_file(refused, recording, tmp_path) -> None:
     scan = recording / "000003.bin"
     before = scan.read_bytes()
     line = refused("run", "dror", recording, "--out", tmp_path / "out", "--weather", scan)
@@ -183,7 +181,7 @@ def test_a_table_takes_the_place_of_no_other_file(refused, recording: Path, tmp_
     assert not (tmp_path / "out").exists()
 
 
-def test_the_table_of_an_earlier_run_is_replaced(succeed, recording: Path, tmp_path: Path) -> None:
+def test_the_table_of_an_earlier_run_is_replaced(succeed, recording, tmp_path) -> None:
     table = tmp_path / "out/weather.csv"
     (tmp_path / "out").mkdir()
     table.touch()
@@ -193,7 +191,7 @@ def test_the_table_of_an_earlier_run_is_replaced(succeed, recording: Path, tmp_p
 
 
 def test_a_reader_that_has_had_enough_leaves_whole_results_and_their_table(
-    recording: Path, tmp_path: Path
+    recording, tmp_path
 ) -> None:
     options = ("--out", tmp_path / "out", "--weather", tmp_path / "weather.csv")
     with subprocess.Popen(
@@ -212,7 +210,7 @@ def test_a_reader_that_has_had_enough_leaves_whole_results_and_their_table(
 
 
 def test_scans_of_which_nothing_is_known_have_no_level(
-    run_derain, succeed, recording: Path, tmp_path: Path
+    run_derain, succeed, recording, tmp_path
 ) -> None:
     (recording / "000001.bin").write_bytes(b"12345")
     table = tmp_path / "weather.csv"
@@ -228,7 +226,7 @@ def test_scans_of_which_nothing_is_known_have_no_level(
 
 
 @pytest.fixture
-def fog(tmp_path: Path) -> tuple[Path, Path]:
+def fog(tmp_path) -> tuple[Path, Path]:
     """A dry scan of a long street, and six in fog: nothing returns from beyond 20 m."""
     generator = np.random.default_rng(0)
     azimuth = generator.uniform(-np.pi, np.pi, 12_000)
@@ -243,9 +241,7 @@ def fog(tmp_path: Path) -> tuple[Path, Path]:
     return reference, folder
 
 
-def test_range_that_is_lost_beside_a_dry_reference_is_a_level(
-    run_derain, fog: tuple[Path, Path], tmp_path: Path
-) -> None:
+def test_range_that_is_lost_beside_a_dry_reference_is_a_level(run_derain, fog, tmp_path) -> None:
     reference, folder = fog
     arguments = ("run", "ssr", folder, "--out", tmp_path / "out", "--json", "--fail-at", "warning")
     blind, seeing = run_derain(*arguments), run_derain(*arguments, "--dry", reference)
@@ -261,7 +257,7 @@ def test_range_that_is_lost_beside_a_dry_reference_is_a_level(
 
 
 def test_a_reference_that_can_show_no_level_is_refused(
-    run_derain, succeed, recording: Path, tmp_path: Path
+    run_derain, succeed, recording, tmp_path
 ) -> None:
     small = recording / "000000.bin"  # a wall at 15 m
     arguments = ("run", "dror", recording, "--out", tmp_path / "out", "--dry")

@@ -47,9 +47,7 @@ def stopped(path: Path, by: signal.Signals) -> tuple[int, str]:
 
 
 @pytest.mark.parametrize("by", ENDING, ids=lambda by: by.name)
-def test_a_command_that_a_signal_ends_leaves_nothing_half_written(
-    tmp_path: Path, by: signal.Signals
-) -> None:
+def test_a_command_that_a_signal_ends_leaves_nothing_half_written(tmp_path, by) -> None:
     path = tmp_path / "result.bin"
     path.write_bytes(b"old")
     name = "" if by == signal.SIGINT else f" by {by.name}"
@@ -58,9 +56,7 @@ def test_a_command_that_a_signal_ends_leaves_nothing_half_written(
     assert path.read_bytes() == b"old"
 
 
-def test_a_signal_ends_a_command_in_which_a_class_is_being_made(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_signal_ends_a_command_in_which_a_class_is_being_made(monkeypatch, capsys) -> None:
     class Attribute:
         def __set_name__(self, owner: type, name: str) -> None:
             raise Interruption(signal.SIGTERM)
@@ -71,9 +67,7 @@ def test_a_signal_ends_a_command_in_which_a_class_is_being_made(
     assert capsys.readouterr().err == "derain: interrupted by SIGTERM\n"
 
 
-def test_what_a_killed_command_leaves_goes_with_the_next_and_what_is_in_use_stays(
-    tmp_path: Path,
-) -> None:
+def test_what_a_killed_command_leaves_goes_with_the_next_and_what_is_in_use_stays(tmp_path) -> None:
     path = tmp_path / "result.bin"
     assert stopped(path, signal.SIGKILL) == (-signal.SIGKILL, "")
     (abandoned,) = tmp_path.iterdir()

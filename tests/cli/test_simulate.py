@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from derain.errors import InputError
@@ -25,7 +24,7 @@ def _open3d() -> None:
 
 
 @pytest.fixture
-def clean(tmp_path: Path) -> Path:
+def clean(tmp_path) -> Path:
     """A folder of two clean scans of a room, 5,000 and 6,000 points."""
     folder = tmp_path / "clean"
     folder.mkdir()
@@ -38,7 +37,7 @@ def names(folder: Path) -> list[str]:
     return sorted(file.name for file in folder.iterdir())
 
 
-def test_a_data_set_is_written_and_written_once(succeed, refused, facts_of, tmp_path: Path) -> None:
+def test_a_data_set_is_written_and_written_once(succeed, refused, facts_of, tmp_path) -> None:
     root = tmp_path / "facility"
     outcome = succeed("simulate", "--out", root, *QUICK)
     assert outcome.out.split(".")[0] == f"{root}: 3 sequences, 3 scans"
@@ -68,7 +67,7 @@ def test_a_data_set_is_written_and_written_once(succeed, refused, facts_of, tmp_
     assert (root / "manifest.json").read_text() == manifest
 
 
-def test_shards_are_counted_by_the_status(succeed, run_derain, tmp_path: Path) -> None:
+def test_shards_are_counted_by_the_status(succeed, run_derain, tmp_path) -> None:
     root = tmp_path / "facility"
     command = ("simulate", "--out", root, *QUICK)
     assert f"derain status {root}" in succeed(*command, "--shard", "1/2").out
@@ -79,7 +78,7 @@ def test_shards_are_counted_by_the_status(succeed, run_derain, tmp_path: Path) -
 
 
 def test_a_drive_goes_along_a_street_in_the_rain_of_its_options_without_a_radar(
-    succeed, facts_of, tmp_path: Path
+    succeed, facts_of, tmp_path
 ) -> None:
     root = tmp_path / "drive"
     options = ["--layout", "street", "--speed", "13", "--traffic", "2", "--rain", "50"]
@@ -99,7 +98,7 @@ def rained(folder: Path, stem: str, columns: int = 4) -> tuple[NDArray[np.float3
     return points, read_labels(folder / f"{stem}.label", len(points))
 
 
-def test_clean_scans_get_rain_and_labels_of_it(succeed, clean: Path, tmp_path: Path) -> None:
+def test_clean_scans_get_rain_and_labels_of_it(succeed, clean, tmp_path) -> None:
     out = tmp_path / "rainy"
     outcome = succeed("simulate", "--on", clean, "--rain", "50", "--out", out, "--json")
     assert names(out) == ["000005.bin", "000005.label", "000006.bin", "000006.label"]
@@ -116,7 +115,7 @@ def test_clean_scans_get_rain_and_labels_of_it(succeed, clean: Path, tmp_path: P
 
 
 def test_a_line_holds_what_the_rain_did_to_a_scan_and_a_bad_scan_is_reported(
-    run_derain, clean: Path, tmp_path: Path
+    run_derain, clean, tmp_path
 ) -> None:
     scan, bad = clean / "000005.bin", clean / "000004.bin"
     bad.write_bytes(b"12345")
@@ -128,7 +127,7 @@ def test_a_line_holds_what_the_rain_did_to_a_scan_and_a_bad_scan_is_reported(
     assert "1 of 2 scans" in last
 
 
-def test_columns_and_a_picture(succeed, tmp_path: Path, saved_figures: list[Figure]) -> None:
+def test_columns_and_a_picture(succeed, tmp_path, saved_figures) -> None:
     points = np.column_stack([scene(3000), np.arange(3000, dtype=np.float32) % 32])
     points.astype("<f4").tofile(tmp_path / "scan.bin")
     arguments = ["--columns", "x,y,z,intensity,ring", "--picture", "--rain", "50"]
@@ -159,7 +158,7 @@ def test_columns_and_a_picture(succeed, tmp_path: Path, saved_figures: list[Figu
     ],
 )
 def test_what_cannot_be_meant_is_refused_before_anything_is_written(
-    refused, tmp_path: Path, arguments: list[str], message: str
+    refused, tmp_path, arguments, message
 ) -> None:
     line = refused("simulate", "--out", tmp_path / "out", *arguments)
     assert line.startswith(f"derain: {message}")

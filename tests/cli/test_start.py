@@ -25,9 +25,7 @@ def trained(path: Path, neighbours: int = 4) -> OutDet:
     return model
 
 
-def test_an_onnx_file_stands_for_the_checkpoint_beside_it(
-    tmp_path: Path, checkpoint: Path, onnx_model: Path
-) -> None:
+def test_an_onnx_file_stands_for_the_checkpoint_beside_it(tmp_path, checkpoint, onnx_model) -> None:
     exported = Path(shutil.copy(onnx_model, tmp_path))
     checkpoint = Path(shutil.copy(checkpoint, tmp_path))
     assert checkpoint_of(str(checkpoint)) == checkpoint_of(str(exported)) == checkpoint
@@ -41,9 +39,7 @@ def test_an_onnx_file_stands_for_the_checkpoint_beside_it(
         checkpoint_of(str(checkpoint))
 
 
-def test_default_is_the_checkpoint_that_derain_comes_with(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_default_is_the_checkpoint_that_derain_comes_with(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(default, "FOLDER", tmp_path)
     with pytest.raises(InputError, match=r"comes with derain is missing\. Install derain again"):
         checkpoint_of("default")
@@ -51,9 +47,7 @@ def test_default_is_the_checkpoint_that_derain_comes_with(
     assert checkpoint_of("default") == tmp_path / "model.ckpt"
 
 
-def test_fit_begins_with_the_weights_of_its_start(
-    succeed, tmp_path: Path, wads: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_fit_begins_with_the_weights_of_its_start(succeed, tmp_path, wads, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     source = trained(tmp_path / "start.ckpt")
     # At a rate of nothing, it ends where it began.

@@ -22,13 +22,13 @@ POINTS = 200
 
 
 @pytest.fixture(autouse=True)
-def between(monkeypatch: pytest.MonkeyPatch) -> None:
+def between(monkeypatch) -> None:
     """Enters a method of windows."""
     monkeypatch.setattr(METHODS, "_members", {**METHODS, "between": Between})
 
 
 @pytest.fixture
-def drive(tmp_path: Path) -> Path:
+def drive(tmp_path) -> Path:
     """Six scans with labels of WADS, of which every tenth point is snow."""
     folder = write_scenes(tmp_path / "drive/velodyne", *6 * [POINTS])
     for number in range(6):
@@ -37,7 +37,7 @@ def drive(tmp_path: Path) -> Path:
     return folder
 
 
-def test_every_scan_is_printed_and_all_together(succeed, drive: Path, tmp_path: Path) -> None:
+def test_every_scan_is_printed_and_all_together(succeed, drive, tmp_path) -> None:
     out = tmp_path / "taught"
     outcome = succeed("teach", "between", drive, "--out", out, "--set", "rain_below=7")
     lines = outcome.out.splitlines()
@@ -56,7 +56,7 @@ def test_every_scan_is_printed_and_all_together(succeed, drive: Path, tmp_path: 
 
 
 def test_scans_alone_are_labelled_by_the_model_that_comes_with_derain_over_the_recording(
-    succeed, drive: Path, tmp_path: Path
+    succeed, drive, tmp_path
 ) -> None:
     for number, words in enumerate(([drive], ["default", drive])):
         succeed("teach", *words, "--out", tmp_path / f"{number}")
@@ -65,7 +65,7 @@ def test_scans_alone_are_labelled_by_the_model_that_comes_with_derain_over_the_r
 
 
 def test_truth_is_measured_for_the_record_where_a_card_explains_it(
-    succeed, drive: Path, tmp_path: Path
+    succeed, drive, tmp_path
 ) -> None:
     (drive.parent / "labels/000003.label").write_bytes(b"garbage")
     outcome = succeed("teach", "dror", drive, "--out", tmp_path / "out", "--card", "wads")
@@ -78,7 +78,7 @@ def test_truth_is_measured_for_the_record_where_a_card_explains_it(
     assert len(Manifest.read(tmp_path / "out").scans) == 6
 
 
-def test_objects_are_printed_for_json(run_derain, drive: Path, tmp_path: Path) -> None:
+def test_objects_are_printed_for_json(run_derain, drive, tmp_path) -> None:
     outcome = run_derain("teach", "dror", drive, "--out", tmp_path / "out", "--json")
     facts = [json.loads(line) for line in outcome.out.splitlines()]
     assert [Path(item["scan"]).stem for item in facts] == [f"{n:06d}" for n in range(6)]
@@ -86,7 +86,7 @@ def test_objects_are_printed_for_json(run_derain, drive: Path, tmp_path: Path) -
     assert "6 scans" in outcome.err
 
 
-def test_scans_that_cannot_be_read_are_passed_over(run_derain, drive: Path, tmp_path: Path) -> None:
+def test_scans_that_cannot_be_read_are_passed_over(run_derain, drive, tmp_path) -> None:
     (drive / "000002.bin").write_bytes(b"12345")
     outcome = run_derain("teach", "between", drive, "--out", tmp_path / "out")
     assert outcome.code == 2
@@ -103,15 +103,13 @@ def test_scans_that_cannot_be_read_are_passed_over(run_derain, drive: Path, tmp_
         (["--poses", "none.txt"], "none.txt"),
     ],
 )
-def test_what_is_wrong_is_named(
-    run_derain, drive: Path, tmp_path: Path, options: list[str], told: str
-) -> None:
+def test_what_is_wrong_is_named(run_derain, drive, tmp_path, options, told) -> None:
     outcome = run_derain("teach", "between", drive, "--out", tmp_path / "out", *options)
     assert told in outcome.err
     assert (tmp_path / "out").exists() == ("no rain" in told)
 
 
-def test_two_scans_are_all_for_training(run_derain, succeed, drive: Path, tmp_path: Path) -> None:
+def test_two_scans_are_all_for_training(run_derain, succeed, drive, tmp_path) -> None:
     for number in range(2, 6):
         (drive / f"{number:06d}.bin").unlink()
     outcome = succeed("teach", "dror", drive, "--out", tmp_path / "out")
@@ -121,7 +119,7 @@ def test_two_scans_are_all_for_training(run_derain, succeed, drive: Path, tmp_pa
     assert "2 scans in its recording" in outcome.err
 
 
-def test_scans_out_of_order_are_warned_of(run_derain, succeed, drive: Path, tmp_path: Path) -> None:
+def test_scans_out_of_order_are_warned_of(run_derain, succeed, drive, tmp_path) -> None:
     (drive / "times.txt").write_text("0\n0.1\n0.3\n0.2\n0.4\n9\n")
     outcome = succeed("teach", "between", drive, "--out", tmp_path / "out")
     assert "000003.bin: not later than the scan before it" in outcome.err
@@ -129,7 +127,7 @@ def test_scans_out_of_order_are_warned_of(run_derain, succeed, drive: Path, tmp_
     assert "not later" not in run_derain("teach", "dror", drive, "--out", tmp_path / "o").err
 
 
-def test_points_that_are_not_known_stay(succeed, drive: Path, tmp_path: Path) -> None:
+def test_points_that_are_not_known_stay(succeed, drive, tmp_path) -> None:
     command = ["run", "between", drive, "--out", tmp_path / "out", "--poses", "standing"]
     outcome = succeed(*command)
     points = scene(POINTS, 1)
@@ -146,7 +144,7 @@ def test_points_that_are_not_known_stay(succeed, drive: Path, tmp_path: Path) ->
 
 @pytest.mark.parametrize("command", ["run", "teach"])
 def test_the_sensor_is_where_the_option_places_it(
-    run_derain, succeed, drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str
+    run_derain, succeed, drive, tmp_path, monkeypatch, command
 ) -> None:
     made: list[Between] = []
 
@@ -185,7 +183,7 @@ def facts(printed: str) -> list[dict[str, Any]]:
 
 
 def test_workers_write_and_count_what_one_process_does_without_records(
-    succeed, drive: Path, tmp_path: Path
+    succeed, drive, tmp_path
 ) -> None:
     whole = succeed(*command(drive, tmp_path / "whole", "--json"))
     units = succeed(*command(drive, tmp_path / "units", "--json", "--workers", 2, "--block", 3))
@@ -195,9 +193,7 @@ def test_workers_write_and_count_what_one_process_does_without_records(
     assert not (tmp_path / "whole" / FOLDER).exists()
 
 
-def test_what_was_stopped_goes_on_with_the_same_figures(
-    succeed, drive: Path, tmp_path: Path
-) -> None:
+def test_what_was_stopped_goes_on_with_the_same_figures(succeed, drive, tmp_path) -> None:
     out = tmp_path / "out"
     options = ("--block", 2)
     first = succeed(*command(drive, out, *options, "--json"))
@@ -216,7 +212,7 @@ def test_what_was_stopped_goes_on_with_the_same_figures(
 
 
 def test_shards_put_the_labels_in_place_when_the_last_is_done(
-    succeed, drive: Path, run_derain, tmp_path: Path
+    succeed, drive, run_derain, tmp_path
 ) -> None:
     out = tmp_path / "out"
     succeed(*command(drive, tmp_path / "whole"))
@@ -233,7 +229,7 @@ def test_shards_put_the_labels_in_place_when_the_last_is_done(
 
 
 def test_scans_that_fail_are_left_out_of_a_whole_run_and_done_later(
-    succeed, run_derain, drive: Path, tmp_path: Path
+    succeed, run_derain, drive, tmp_path
 ) -> None:
     out, scan = tmp_path / "out", drive / "000003.bin"
     content = scan.read_bytes()

@@ -2,7 +2,6 @@
 
 import shlex
 import shutil
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +19,7 @@ RAIN = np.tile(np.arange(300) >= 270, 3)  # of the three scans
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, write_labelled) -> Path:
+def here(tmp_path, monkeypatch, write_labelled) -> Path:
     """The folder in which the commands run, with three labelled scans."""
     monkeypatch.chdir(tmp_path)
     for number in range(3):
@@ -72,12 +71,12 @@ def test_run_and_bench_keep_to_the_candidates_that_tune_fitted(succeed) -> None:
     assert f" {iou_of(called):.3f} |" in benched.out
 
 
-def test_a_model_has_candidates_of_its_own(refused, onnx_model: Path) -> None:
+def test_a_model_has_candidates_of_its_own(refused, onnx_model) -> None:
     line = refused("tune", onnx_model, *DATA, "--candidates", "--out", BEST)
     assert line == "derain: --candidates: a model has its own. Give it to `derain export`."
 
 
-def test_the_threshold_of_a_model_is_tuned(succeed, onnx_model: Path) -> None:
+def test_the_threshold_of_a_model_is_tuned(succeed, onnx_model) -> None:
     succeed("tune", onnx_model, *DATA, "--out", BEST)
     method, parameters = read_parameters(BEST)
     assert Path(method).samefile(onnx_model)
@@ -87,9 +86,7 @@ def test_the_threshold_of_a_model_is_tuned(succeed, onnx_model: Path) -> None:
     assert found == max(iou_of(probability > threshold) for threshold in (0, *probability))
 
 
-def test_a_tuned_model_is_found_from_any_folder(
-    succeed, here: Path, onnx_model: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_tuned_model_is_found_from_any_folder(succeed, here, onnx_model, monkeypatch) -> None:
     Path("models/tuned").mkdir(parents=True)
     shutil.copy(onnx_model, "models/outdet.onnx")
     succeed("tune", "models/outdet.onnx", *DATA, "--out", "models/tuned/best.yaml")
@@ -111,7 +108,7 @@ def test_a_tuned_model_is_found_from_any_folder(
     assert bench_entry.facts["threshold"] == parameters["threshold"]
 
 
-def test_a_model_that_is_not_beside_its_parameters_is_sought_as_written(onnx_model: Path) -> None:
+def test_a_model_that_is_not_beside_its_parameters_is_sought_as_written(onnx_model) -> None:
     BEST.write_text(f"method: {onnx_model}\nthreshold: 0.5\n")
     assert read_parameters(BEST)[0] == str(onnx_model)
     Path("dsor").touch()  # no model, though it lies there
@@ -136,7 +133,7 @@ def test_scans_without_rain_are_refused(refused, write_labelled) -> None:
     assert not BEST.exists()
 
 
-def test_tuning_on_real_snow_finds_better_parameters(succeed, shared: Path) -> None:
+def test_tuning_on_real_snow_finds_better_parameters(succeed, shared) -> None:
     data = ["--data", shared / "data/wads/sample.bin", "--card", "wads"]
     outcome = succeed("tune", "dsor", *data, "--trials", "20", "--out", BEST)
     words = outcome.out.splitlines()[0].split()
@@ -152,9 +149,6 @@ def test_what_cannot_be_written_is_refused_before_any_work(refused) -> None:
     assert not Path("study.db").exists()
 
 
-COMMAND = [sys.executable, "-c", "import sys; from derain.cli.main import main; sys.exit(main())"]
-
-
 @pytest.mark.parametrize(
     ("place", "named"),
     [
@@ -166,9 +160,7 @@ COMMAND = [sys.executable, "-c", "import sys; from derain.cli.main import main; 
         ("velodyne/0.journal", "cannot be used as storage"),
     ],
 )
-def test_a_storage_that_cannot_be_used_is_refused_in_one_line(
-    refused, place: str, named: str
-) -> None:
+def test_a_storage_that_cannot_be_used_is_refused_in_one_line(refused, place, named) -> None:
     shutil.copy("velodyne/0.bin", "velodyne/0.journal")
     line = refused("tune", "dsor", *DATA, "--storage", place, "--out", BEST)
     assert named in line
@@ -176,7 +168,7 @@ def test_a_storage_that_cannot_be_used_is_refused_in_one_line(
     assert not BEST.exists()
 
 
-def test_no_password_is_written(succeed, onnx_model: Path) -> None:
+def test_no_password_is_written(succeed, onnx_model) -> None:
     storage = ["--storage", "postgresql://me:secret@localhost/trials?password=secret"]
     succeed("tune", onnx_model, *DATA, *storage, "--out", BEST)  # which needs no storage
     assert "postgresql://me:***@localhost/trials?password=***" in BEST.read_text()

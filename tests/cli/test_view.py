@@ -15,13 +15,13 @@ from derain.pictures import scan_pictures
 
 
 @pytest.fixture
-def scan(tmp_path: Path, write_labelled) -> Path:
+def scan(tmp_path, write_labelled) -> Path:
     write_labelled(tmp_path / "velodyne/7.bin", tmp_path / "labels/7.label", rain=110)
     return tmp_path / "velodyne/7.bin"
 
 
 @pytest.fixture
-def saved(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
+def saved(monkeypatch) -> list[Figure]:
     """The figures that are drawn from here on, and not written."""
     figures: list[Figure] = []
     monkeypatch.setattr(scan_pictures, "save", lambda figure, path: figures.append(figure))
@@ -38,7 +38,7 @@ def panels(figure: Figure) -> dict[str, int]:
 
 
 def test_methods_are_drawn_with_and_without_truth(
-    succeed, scan: Path, tmp_path: Path, onnx_model: Path, saved: list[Figure]
+    succeed, scan, tmp_path, onnx_model, saved
 ) -> None:
     rain = np.arange(300) >= 270
     called = {
@@ -66,20 +66,18 @@ def test_methods_are_drawn_with_and_without_truth(
     assert truth.get_suptitle() == bare.get_suptitle() == "7.bin: 300 points"
 
 
-def test_nothing_to_do_is_refused(refused, scan: Path) -> None:
+def test_nothing_to_do_is_refused(refused, scan) -> None:
     assert "Give --out, --window or --rerun." in refused("view", scan, "--methods", "dror")
 
 
-def test_a_card_without_labels_is_refused(refused, tmp_path: Path) -> None:
+def test_a_card_without_labels_is_refused(refused, tmp_path) -> None:
     scene(20).tofile(tmp_path / "bare.bin")
     options = ["--methods", "dror", "--card", "wads", "--out", tmp_path / "out.png"]
     assert "bare.label: there is no such file" in refused("view", tmp_path / "bare.bin", *options)
     assert not (tmp_path / "out.png").exists()
 
 
-def test_points_that_nobody_knows_are_not_judged(
-    succeed, scan: Path, tmp_path: Path, saved: list[Figure]
-) -> None:
+def test_points_that_nobody_knows_are_not_judged(succeed, scan, tmp_path, saved) -> None:
     write_labels(tmp_path / "labels/7.label", np.repeat([255, 0, 3], [100, 170, 30]))
     options = ["--methods", "all", "--card", "rehearse3d", "--out", tmp_path / "out.png"]
     succeed("view", scan, *options)

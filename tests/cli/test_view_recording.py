@@ -17,7 +17,7 @@ SCANS = 4
 
 
 @pytest.fixture
-def recording(tmp_path: Path) -> Path:
+def recording(tmp_path) -> Path:
     """Scans of 300 points of which some cannot be judged, with labels of rain in the last 30."""
     folder = tmp_path / "drive/velodyne"
     folder.mkdir(parents=True)
@@ -31,7 +31,7 @@ def recording(tmp_path: Path) -> Path:
 
 
 def test_what_is_kept_and_removed_is_what_run_finds(
-    succeed, recording: Path, tmp_path: Path, onnx_model: Path
+    succeed, recording, tmp_path, onnx_model
 ) -> None:
     out = tmp_path / "out.rrd"
     methods = {"net": str(onnx_model), "dror": "dror", "persistence": "persistence"}
@@ -65,7 +65,7 @@ def test_what_is_kept_and_removed_is_what_run_finds(
     assert not found.points("/sensor/methods/dror/probability")
 
 
-def test_truth_colours_what_methods_do(succeed, recording: Path, tmp_path: Path) -> None:
+def test_truth_colours_what_methods_do(succeed, recording, tmp_path) -> None:
     card = tmp_path / "card.yaml"
     card.write_text("{name: ours, classes: {0: a, 110: b, 9: c}, rain: [110], unknown: [9]}")
     labels = np.repeat([9, 0, 110], [100, 170, 30])
@@ -106,7 +106,7 @@ def test_truth_colours_what_methods_do(succeed, recording: Path, tmp_path: Path)
     assert ["red: solid, lost" in text for text in captions] == [True, True, False]
 
 
-def test_without_labels_there_is_no_truth(succeed, recording: Path, tmp_path: Path) -> None:
+def test_without_labels_there_is_no_truth(succeed, recording, tmp_path) -> None:
     for label in (recording.parent / "labels").iterdir():
         label.unlink()
     out = tmp_path / "out.rrd"
@@ -119,7 +119,7 @@ def test_without_labels_there_is_no_truth(succeed, recording: Path, tmp_path: Pa
 
 
 def test_some_scans_are_shown_and_a_method_of_several_scans_sees_all(
-    succeed, recording: Path, tmp_path: Path
+    succeed, recording, tmp_path
 ) -> None:
     whole, some = tmp_path / "whole.rrd", tmp_path / "some.rrd"
     options = ["--poses", "standing", "--methods", "persistence"]
@@ -132,7 +132,7 @@ def test_some_scans_are_shown_and_a_method_of_several_scans_sees_all(
         np.testing.assert_array_equal(points, of_all[number])
 
 
-def test_scans_lie_where_and_when_they_were_taken(succeed, recording: Path, tmp_path: Path) -> None:
+def test_scans_lie_where_and_when_they_were_taken(succeed, recording, tmp_path) -> None:
     poses = np.tile(np.eye(4)[:3], (SCANS, 1, 1))
     poses[:, 0, 3] = 4_000_000 + np.arange(SCANS)  # as maps count, where float32 knows no metres
     np.savetxt(recording.parent / "poses.txt", poses.reshape(SCANS, 12))
@@ -150,7 +150,7 @@ def test_scans_lie_where_and_when_they_were_taken(succeed, recording: Path, tmp_
 
 
 def test_a_scan_that_cannot_be_read_is_reported_once_and_shown_empty(
-    run_derain, recording: Path, tmp_path: Path
+    run_derain, recording, tmp_path
 ) -> None:
     (recording / "002.bin").write_bytes(b"no scan")
     out = tmp_path / "out.rrd"
@@ -178,12 +178,7 @@ def test_a_scan_that_cannot_be_read_is_reported_once_and_shown_empty(
     ],
 )
 def test_what_cannot_be_meant_is_refused_and_nothing_is_written(
-    refused,
-    recording: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    options: list[str],
-    said: str,
+    refused, recording, tmp_path, monkeypatch, options, said
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert said in refused("view", recording, *options)
@@ -191,7 +186,7 @@ def test_what_cannot_be_meant_is_refused_and_nothing_is_written(
 
 
 def test_a_file_that_is_there_stays_until_the_new_one_is_whole(
-    run_derain, succeed, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run_derain, succeed, recording, tmp_path, monkeypatch
 ) -> None:
     out = tmp_path / "out.rrd"
     out.write_bytes(b"as it was")
@@ -209,7 +204,7 @@ def test_a_file_that_is_there_stays_until_the_new_one_is_whole(
 
 
 def test_a_full_disk_ends_the_work_with_a_message_and_leaves_nothing(
-    run_derain, recording: Path, tmp_path: Path
+    run_derain, recording, tmp_path
 ) -> None:
     """Rerun's library by itself waits for ever where its file may not grow."""
     out = tmp_path / "out.rrd"

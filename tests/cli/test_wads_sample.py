@@ -22,7 +22,7 @@ def derain(*arguments: str | Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def folder(shared: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(shared, tmp_path_factory) -> Path:
     """The three commands a user types, in a folder of its own."""
     folder = tmp_path_factory.mktemp("wads")
     weights, sample = shared / "oracles/outdet_wads.pt", shared / "data/wads/sample.bin"
@@ -35,7 +35,7 @@ def folder(shared: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_scores_are_the_published_ones(folder: Path, shared: Path) -> None:
+def test_the_scores_are_the_published_ones(folder, shared) -> None:
     points = 115_881
     truth = semantic(read_labels(shared / "data/wads/sample.label", points))
     found = read_labels(folder / "cleaned/sample.label", points)
@@ -45,13 +45,13 @@ def test_the_scores_are_the_published_ones(folder: Path, shared: Path) -> None:
     assert scores.iou == pytest.approx(0.8339, abs=5e-4)
 
 
-def test_the_cleaned_scan_is_the_sample_without_its_rain(folder: Path, shared: Path) -> None:
+def test_the_cleaned_scan_is_the_sample_without_its_rain(folder, shared) -> None:
     rain = np.fromfile(folder / "cleaned/sample.label", "<u4") == 1
     sample = np.fromfile(shared / "data/wads/sample.bin", "<f4").reshape(-1, 4)
     assert (folder / "cleaned/sample.bin").read_bytes() == sample[~rain].tobytes()
 
 
-def test_the_logits_are_those_of_the_oracle(folder: Path, shared: Path) -> None:
+def test_the_logits_are_those_of_the_oracle(folder, shared) -> None:
     derainer = Derainer(folder / "w.onnx")
     view = derainer.view(read_scan(shared / "data/wads/sample.bin"))
     expected = np.load(shared / "oracles/outdet_wads.npz")["logits"]

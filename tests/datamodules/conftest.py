@@ -53,7 +53,7 @@ def connect() -> Connect:
 
 
 @pytest.fixture
-def folder(tmp_path: Path, write: Callable[..., None]) -> Callable[..., Folder]:
+def folder(tmp_path, write) -> Callable[..., Folder]:
     """Makes a data module of six scans of 40, 41, ... points, a third of them snow of WADS."""
     for number in range(6):
         file = tmp_path / f"{number}.bin"

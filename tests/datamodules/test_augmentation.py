@@ -13,7 +13,6 @@ from derain.scan import Scan
 
 HARD_CASES = dict(hard_cases(largest=5000))
 TURN = Augmentation(rotation_probability=1, jitter_probability=0)
-JITTER = Augmentation(rotation_probability=0, jitter_probability=1)
 MIRROR = Augmentation(0, 0, mirror_probability=1)
 SECTOR = Augmentation(0, 0, sector_probability=1, sector=70)
 DROP = Augmentation(0, 0, dropping_probability=1)
@@ -25,7 +24,7 @@ def street() -> Scan:
 
 
 @given(st.integers(0, 2**32))
-def test_a_turn_is_about_the_vertical_axis_and_the_same_for_all_points(seed: int) -> None:
+def test_a_turn_is_about_the_vertical_axis_and_the_same_for_all_points(seed) -> None:
     scan = street()
     turned = TURN(scan, np.random.default_rng(seed))
     before, after = (s.xyz[:, 0] + 1j * s.xyz[:, 1] for s in (scan, turned))
@@ -42,7 +41,7 @@ def test_jitter_is_in_metres_and_the_same_in_every_direction() -> None:
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
-def test_each_happens_to_its_share_of_scans(share: float) -> None:
+def test_each_happens_to_its_share_of_scans(share) -> None:
     scan = Scan.of(scene(300))
     rng = np.random.default_rng(0)
     mirror = Augmentation(0, 0, mirror_probability=share)
@@ -61,7 +60,7 @@ def test_a_mirror_changes_left_and_right_and_nothing_else() -> None:
 
 
 @given(st.integers(0, 2**32))
-def test_points_that_are_left_keep_their_order_and_what_belongs_to_them(seed: int) -> None:
+def test_points_that_are_left_keep_their_order_and_what_belongs_to_them(seed) -> None:
     scan = street()
     left = DROP(scan, np.random.default_rng(seed))
     assert left.label is not None
@@ -71,7 +70,7 @@ def test_points_that_are_left_keep_their_order_and_what_belongs_to_them(seed: in
 
 
 @pytest.mark.parametrize("dropping", [0.1, 0.5])
-def test_a_scan_loses_any_share_of_its_points_up_to_the_largest(dropping: float) -> None:
+def test_a_scan_loses_any_share_of_its_points_up_to_the_largest(dropping) -> None:
     scan, rng = Scan.of(scene(5000)), np.random.default_rng(0)
     drop = Augmentation(0, 0, dropping_probability=1, dropping=dropping)
     lost = np.array([1 - len(drop(scan, rng)) / len(scan) for _ in range(300)])
@@ -82,7 +81,7 @@ def test_a_scan_loses_any_share_of_its_points_up_to_the_largest(dropping: float)
 
 @given(st.floats(-180, 180), st.floats(0, 350), st.integers(0, 2**32), st.booleans(), st.booleans())
 def test_what_is_seen_stays_where_a_network_looks_that_does_not_see_all_around(
-    right: float, width: float, seed: int, turned: bool, mirrored: bool
+    right, width, seed, turned, mirrored
 ) -> None:
     azimuth = np.radians(np.linspace(right, right + width, 50))
     points = np.stack([9 * np.cos(azimuth), 9 * np.sin(azimuth), azimuth * 0 + 1], axis=1)
@@ -97,7 +96,7 @@ def test_what_is_seen_stays_where_a_network_looks_that_does_not_see_all_around(
 
 
 @pytest.mark.parametrize("scan", HARD_CASES.values(), ids=HARD_CASES)
-def test_points_that_cannot_be_judged_stay_as_they_are(scan: Scan) -> None:
+def test_points_that_cannot_be_judged_stay_as_they_are(scan) -> None:
     before = scan.xyz.copy()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -115,7 +114,7 @@ def test_points_that_cannot_be_judged_stay_as_they_are(scan: Scan) -> None:
 
 
 @given(st.integers(0, 2**32))
-def test_a_sector_is_all_that_there_is_between_two_azimuths(seed: int) -> None:
+def test_a_sector_is_all_that_there_is_between_two_azimuths(seed) -> None:
     scan = Scan.of(scene(500)).with_label(np.arange(500))
     kept = SECTOR(scan, np.random.default_rng(seed))
     assert kept.label is not None

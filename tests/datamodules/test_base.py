@@ -3,7 +3,6 @@
 import pickle
 import re
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,9 +19,7 @@ from derain.models.lisnownet import LiSnowNet
 from derain.scan import Scan
 from derain.views.neighbours import NeighbourView
 
-Write = Callable[..., None]
 Connect = Callable[..., ScanDataModule]
-MakeFolder = Callable[..., Folder]
 STILL = Augmentation(rotation_probability=0, jitter_probability=0)
 SCANS = 6
 SNOW = 110
@@ -46,7 +43,7 @@ def scans(data: ScanDataModule, part: str) -> list[Scan]:
 
 
 def test_what_is_not_trained_on_comes_in_order_and_untouched_in_batches_of_the_size_asked_for(
-    folder: MakeFolder, connect: Connect
+    folder, connect
 ) -> None:
     data = connect(folder(batch_size=4))
     for part in ("val", "test", "predict"):
@@ -60,7 +57,7 @@ def test_what_is_not_trained_on_comes_in_order_and_untouched_in_batches_of_the_s
 
 @pytest.mark.parametrize("neighbours", [3, 9])
 def test_the_view_is_the_models_and_the_target_is_one_where_the_card_says_rain(
-    folder: MakeFolder, connect: Connect, neighbours: int
+    folder, connect, neighbours
 ) -> None:
     batch = batches(connect(folder(), neighbours), "val")[0]
     scan = batch.measured[0].scan
@@ -72,7 +69,7 @@ def test_the_view_is_the_models_and_the_target_is_one_where_the_card_says_rain(
     np.testing.assert_array_equal(batch.target.numpy(), scan.label[view.first] == SNOW)
 
 
-def test_a_data_set_can_be_sent_to_a_worker(folder: MakeFolder, connect: Connect) -> None:
+def test_a_data_set_can_be_sent_to_a_worker(folder, connect) -> None:
     # Where processes do not fork, workers get the data set by pickling.
     dataset: Any = connect(folder(deduplicate=True)).val_dataloader().dataset
     sent = pickle.loads(pickle.dumps(dataset))
@@ -80,9 +77,7 @@ def test_a_data_set_can_be_sent_to_a_worker(folder: MakeFolder, connect: Connect
     np.testing.assert_array_equal(sent[3].view.points, dataset[3].view.points)
 
 
-def test_duplicates_are_measured_once_and_every_row_is_predicted(
-    tmp_path: Path, write: Write, connect: Connect
-) -> None:
+def test_duplicates_are_measured_once_and_every_row_is_predicted(tmp_path, write, connect) -> None:
     distinct = scene(30)
     rows = np.random.default_rng(0).permutation(np.resize(np.arange(30), 75))
     points = np.concatenate([distinct[rows], np.full((5, 4), np.nan, np.float32)])
@@ -106,7 +101,7 @@ def test_duplicates_are_measured_once_and_every_row_is_predicted(
 
 @pytest.mark.parametrize(("card", "asked"), [("kitti", None), ("wads", False)])
 def test_without_asking_duplicates_are_counted_as_often_as_they_are_there(
-    tmp_path: Path, write: Write, connect: Connect, card: str, asked: bool | None
+    tmp_path, write, connect, card, asked
 ) -> None:
     write(tmp_path / "a.bin", tmp_path / "a.label", [0], np.repeat(scene(10), 3, axis=0))
     loading = Loading(deduplicate=asked)
@@ -115,13 +110,13 @@ def test_without_asking_duplicates_are_counted_as_often_as_they_are_there(
 
 
 @pytest.fixture
-def unsupervised(small_grid: dict[str, Any], connect: Connect) -> Connect:
+def unsupervised(small_grid, connect) -> Connect:
     """Has a data module agree with a model that does not learn from labels."""
     return lambda data: connect(data, model=LiSnowNet(small_grid, width=2))
 
 
 def test_a_model_that_learns_from_no_labels_is_only_measured_by_those_that_there_are(
-    folder: MakeFolder, unsupervised: Connect, tmp_path: Path
+    folder, unsupervised, tmp_path
 ) -> None:
     data = unsupervised(folder(batch_size=SCANS))
     assert {frame.label_path for frame in data.frames("train")} == {None}
@@ -135,9 +130,7 @@ def test_a_model_that_learns_from_no_labels_is_only_measured_by_those_that_there
 
 
 @pytest.mark.parametrize("part", ["train", "validation", "test"])
-def test_a_model_that_learns_from_labels_needs_them_all(
-    folder: MakeFolder, connect: Connect, tmp_path: Path, part: Any
-) -> None:
+def test_a_model_that_learns_from_labels_needs_them_all(folder, connect, tmp_path, part) -> None:
     data = connect(folder())
     (tmp_path / "2.label").unlink()
     with pytest.raises(InputError, match=r"2\.bin: its labels are not at .*data card"):
@@ -147,7 +140,7 @@ def test_a_model_that_learns_from_labels_needs_them_all(
 
 @pytest.mark.parametrize("card", ["simulated", "rehearse3d"])
 def test_statistics_that_the_card_lacks_are_taken_from_the_training_scans(
-    tmp_path: Path, write: Write, unsupervised: Connect, card: str
+    tmp_path, write, unsupervised, card
 ) -> None:
     write(tmp_path / "0.bin", points=scene(40))
     data = unsupervised(Folder(str(tmp_path), card, train=["0.bin"]))
@@ -169,13 +162,7 @@ def test_statistics_that_the_card_lacks_are_taken_from_the_training_scans(
     ids=["unknown class", "short labels", "half a row"],
 )
 def test_a_file_that_cannot_be_used_is_named_from_a_worker_as_well(
-    folder: MakeFolder,
-    connect: Connect,
-    tmp_path: Path,
-    workers: int,
-    file: str,
-    content: np.ndarray,
-    message: str,
+    folder, connect, tmp_path, workers, file, content, message
 ) -> None:
     data = connect(folder(workers=workers))
     content.astype("<u4").tofile(tmp_path / file)

@@ -1,6 +1,6 @@
 """What is kept from epoch to epoch: the same batches as without, and no more than there is room."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -56,13 +56,7 @@ def epochs(data: Folder, part: Part, loading: Loading) -> Iterator[Batch]:
 
 @pytest.mark.parametrize("augmentation", [NOTHING, EVERYTHING], ids=["still", "changed"])
 @pytest.mark.parametrize(("part", "workers"), [("train", 0), ("train", 2), ("validation", 0)])
-def test_keeping_changes_no_batch(
-    folder: Callable[..., Folder],
-    connect: Callable[..., Any],
-    part: Part,
-    augmentation: Augmentation,
-    workers: int,
-) -> None:
+def test_keeping_changes_no_batch(folder, connect, part, augmentation, workers) -> None:
     data = connect(folder())
     kept = epochs(data, part, Loading(workers=workers, augmentation=augmentation))
     anew = epochs(data, part, Loading(augmentation=augmentation, cache_mb=0))
@@ -77,12 +71,7 @@ def test_keeping_changes_no_batch(
 @pytest.mark.parametrize(("megabytes", "times"), [(0, 3), (1, 1)])
 @pytest.mark.parametrize("part", ["train", "validation"])
 def test_scans_are_read_once_where_there_is_room(
-    folder: Callable[..., Folder],
-    connect: Callable[..., Any],
-    part: Part,
-    megabytes: int,
-    times: int,
-    monkeypatch: pytest.MonkeyPatch,
+    folder, connect, part, megabytes, times, monkeypatch
 ) -> None:
     from derain.sources.reader import FrameReader
 

@@ -1,7 +1,5 @@
 """Columns of fused scans reach the models that name them, and no other."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -30,7 +28,7 @@ def fused(seed: int, points: int = 60) -> Scan:
 
 
 @pytest.fixture(params=["bin", "npz"])
-def data(request: pytest.FixtureRequest, tmp_path: Path) -> Folder:
+def data(request, tmp_path) -> Folder:
     """A data module of three fused scans in a format."""
     for number in range(3):
         path = tmp_path / f"{number}.{request.param}"
@@ -42,7 +40,7 @@ def data(request: pytest.FixtureRequest, tmp_path: Path) -> Folder:
     return Folder(str(tmp_path), str(tmp_path / "card.yaml"), **parts, loading=loading)
 
 
-def test_extra_channels_are_measured_and_batched_for_a_model_that_names_them(data: Folder) -> None:
+def test_extra_channels_are_measured_and_batched_for_a_model_that_names_them(data) -> None:
     model = OutDet(channels=("x", "y", "z", "intensity", "rcs", "radar", "doppler"))
     agree_on_task(model, data)
     scans = [fused(number) for number in range(3)]
@@ -63,7 +61,7 @@ def test_extra_channels_are_measured_and_batched_for_a_model_that_names_them(dat
             np.testing.assert_array_equal(points[~known, place], np.float32(model.spec.mean[place]))
 
 
-def test_a_model_that_names_none_is_given_none(data: Folder) -> None:
+def test_a_model_that_names_none_is_given_none(data) -> None:
     assert set(data.read(data.frames("train")[0]).fields) == set(COLUMNS)  # without a model: all
     agree_on_task(OutDet(), data)
     assert data.card.extra == {}

@@ -1,6 +1,5 @@
 """Any folder of scans and labels can be trained on."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -9,14 +8,12 @@ from derain.datamodules.folder import Folder
 from derain.errors import InputError
 from derain.sources.source import Source
 
-Write = Callable[..., None]
-
 
 def names(frames: Source) -> list[str]:
     return [Path(frame.name).name for frame in frames]
 
 
-def test_patterns_find_scans_of_all_formats_each_in_order(tmp_path: Path, write: Write) -> None:
+def test_patterns_find_scans_of_all_formats_each_in_order(tmp_path, write) -> None:
     for name in ("b.bin", "a.pcd", "c.npz"):
         write(tmp_path / name, (tmp_path / name).with_suffix(".label"))
     data = Folder(str(tmp_path), "wads", train=["*"], validation=["b.*", "a.*"], test=["[ac].*"])
@@ -25,7 +22,7 @@ def test_patterns_find_scans_of_all_formats_each_in_order(tmp_path: Path, write:
     assert names(data.frames("test")) == names(data.frames("predict")) == ["a.pcd", "c.npz"]
 
 
-def test_a_pattern_reaches_into_folders_and_may_be_absolute(tmp_path: Path, write: Write) -> None:
+def test_a_pattern_reaches_into_folders_and_may_be_absolute(tmp_path, write) -> None:
     root = tmp_path / "run [1]"  # the signs of patterns are none in a root
     deep = root / "day" / "one" / "a.bin"
     write(deep, deep.with_suffix(".label"))
@@ -34,13 +31,13 @@ def test_a_pattern_reaches_into_folders_and_may_be_absolute(tmp_path: Path, writ
         assert (frame.path, frame.label_path) == (deep, deep.with_suffix(".label"))
 
 
-def test_a_part_without_patterns_is_refused(tmp_path: Path) -> None:
+def test_a_part_without_patterns_is_refused(tmp_path) -> None:
     with pytest.raises(InputError, match=r"no patterns for validation\. Give --data\.validation"):
         Folder(str(tmp_path), "wads", train=["*.bin"]).frames("validation")
 
 
 @pytest.mark.parametrize("pattern", ["*.pcd", "", "velodyne/*", "*.label"])
-def test_a_pattern_that_finds_nothing_is_named(tmp_path: Path, write: Write, pattern: str) -> None:
+def test_a_pattern_that_finds_nothing_is_named(tmp_path, write, pattern) -> None:
     write(tmp_path / "a.bin", tmp_path / "a.label")
     with pytest.raises(InputError, match="matches no scan") as refusal:
         Folder(str(tmp_path), "wads", train=["a.bin", pattern]).frames("train")

@@ -1,7 +1,5 @@
 """Scans in memory, and any source, are data like files."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -36,7 +34,7 @@ def test_scans_are_read_as_they_are_given_but_in_the_unit_of_the_card() -> None:
     assert data.card is WADS
 
 
-def test_a_source_is_taken_as_it_is(tmp_path: Path) -> None:
+def test_a_source_is_taken_as_it_is(tmp_path) -> None:
     scene(40).tofile(tmp_path / "a.bin")
     files = named_frames([tmp_path])
     data = InMemory(test=files, card="wads")

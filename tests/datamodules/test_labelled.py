@@ -27,7 +27,7 @@ def in_sequences(root: Path, write: Write, scans: str, labels: str, *names: str)
 
 
 @pytest.fixture
-def simulated(tmp_path: Path, write: Write) -> Path:
+def simulated(tmp_path, write) -> Path:
     """A simulated data set of three sequences."""
     root = in_sequences(
         tmp_path / "set", write, "lidar_radar_pcd", "lidar_radar_labels", "000", "001", "002"
@@ -43,9 +43,7 @@ def found(paths: list[Path], card: str, part: str = "test") -> list[str]:
     return [str(frame.label_path.relative_to(paths[0].parent)) for frame in data.frames(part)]
 
 
-def test_files_and_folders_are_taken_with_the_labels_beside_them(
-    tmp_path: Path, write: Write
-) -> None:
+def test_files_and_folders_are_taken_with_the_labels_beside_them(tmp_path, write) -> None:
     write(tmp_path / "a/single.bin", tmp_path / "a/single.label")
     for frame in ("1", "0"):
         write(tmp_path / f"velodyne/{frame}.bin", tmp_path / f"labels/{frame}.label")
@@ -59,7 +57,7 @@ def test_files_and_folders_are_taken_with_the_labels_beside_them(
 
 
 def test_labels_that_lie_elsewhere_are_found_by_the_card_that_the_message_shows(
-    tmp_path: Path, write: Write
+    tmp_path, write
 ) -> None:
     write(tmp_path / "drive/0.bin", tmp_path / "truth/0.label")
     with pytest.raises(InputError, match="its labels are not at") as refusal:
@@ -71,7 +69,7 @@ def test_labels_that_lie_elsewhere_are_found_by_the_card_that_the_message_shows(
     assert frame.label_path == tmp_path / "truth/0.label"
 
 
-def test_a_simulated_data_set_brings_its_split_its_card_and_its_rain(simulated: Path) -> None:
+def test_a_simulated_data_set_brings_its_split_its_card_and_its_rain(simulated) -> None:
     for part, name in {"train": "000", "validation": "001", "test": "002"}.items():
         labels = f"set/sequences/{name}/lidar_radar_labels/0.label"
         assert found([simulated], "simulated", part) == [labels]
@@ -79,9 +77,7 @@ def test_a_simulated_data_set_brings_its_split_its_card_and_its_rain(simulated: 
     assert rain_rates([simulated], None) == {"000": 0.0, "002": 25.0}
 
 
-def test_rehearse3d_is_known_by_its_folders_and_anything_else_needs_a_card(
-    tmp_path: Path, write: Write
-) -> None:
+def test_rehearse3d_is_known_by_its_folders_and_anything_else_needs_a_card(tmp_path, write) -> None:
     rehearse3d = in_sequences(tmp_path / "r", write, "lidar_radar_pcd", "lidar_radar_labels", "005")
     assert card_of([rehearse3d], None) == load_card("rehearse3d")
     assert card_of([rehearse3d], "simulated") == load_card("simulated")
@@ -91,13 +87,13 @@ def test_rehearse3d_is_known_by_its_folders_and_anything_else_needs_a_card(
         card_of([other], None)
 
 
-def test_a_root_whose_sequences_hold_no_scans_is_refused(tmp_path: Path) -> None:
+def test_a_root_whose_sequences_hold_no_scans_is_refused(tmp_path) -> None:
     (tmp_path / "sequences/00/other").mkdir(parents=True)
     with pytest.raises(InputError, match="no sequence has a folder velodyne or lidar"):
         labelled_scans([tmp_path], load_card("kitti"), Loading())
 
 
-def test_rain_rates_are_read_by_the_name_of_the_sequence(tmp_path: Path) -> None:
+def test_rain_rates_are_read_by_the_name_of_the_sequence(tmp_path) -> None:
     rates = tmp_path / "rates.yaml"
     rates.write_text('"005": 25\n"010": 10.5\n')
     known = rain_rates([tmp_path], rates)
@@ -106,16 +102,14 @@ def test_rain_rates_are_read_by_the_name_of_the_sequence(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("text", ["010: 25", '"010": heavy', '"010": -5', "- 25", ""])
-def test_what_is_no_file_of_rain_rates_is_refused(tmp_path: Path, text: str) -> None:
+def test_what_is_no_file_of_rain_rates_is_refused(tmp_path, text) -> None:
     rates = tmp_path / "rates.yaml"
     rates.write_text(text)
     with pytest.raises(InputError, match=r"rates\.yaml: "):
         rain_rates([tmp_path], rates)
 
 
-def test_a_card_says_where_the_labels_of_sequences_and_of_scans_lie(
-    tmp_path: Path, write: Write
-) -> None:
+def test_a_card_says_where_the_labels_of_sequences_and_of_scans_lie(tmp_path, write) -> None:
     ours = tmp_path / "ours.yaml"
     ours.write_text(
         "name: ours\nclasses: {0: dry, 3: wet}\nrain: [3]\n"
@@ -134,13 +128,13 @@ def test_a_card_says_where_the_labels_of_sequences_and_of_scans_lie(
         assert [frame.label_path for frame in frames] == expected
 
 
-def test_a_data_set_is_named_alone(simulated: Path, tmp_path: Path) -> None:
+def test_a_data_set_is_named_alone(simulated, tmp_path) -> None:
     for paths in ([simulated, simulated], [tmp_path, simulated]):
         with pytest.raises(InputError, match="is a data set"):
             labelled_scans(paths, load_card("simulated"), Loading())
 
 
-def test_a_part_of_a_simulated_data_set_is_known_as_simulated(simulated: Path) -> None:
+def test_a_part_of_a_simulated_data_set_is_known_as_simulated(simulated) -> None:
     part = simulated / "sequences/002"
     assert card_of([part], None) == load_card("simulated")
     assert rain_rates([part], None)["002"] == 25.0

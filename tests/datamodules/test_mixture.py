@@ -1,9 +1,7 @@
 """Several data sets at once: each with its labels, its weight and its place in what is told."""
 
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import lightning
 import numpy as np
@@ -112,7 +110,7 @@ def trainer(**options: object) -> lightning.Trainer:
     return lightning.Trainer(accelerator="cpu", num_sanity_val_steps=0, **quiet, **options)
 
 
-def test_validation_is_of_all_parts_together_and_told_of_each(tmp_path: Path) -> None:
+def test_validation_is_of_all_parts_together_and_told_of_each(tmp_path) -> None:
     lightning.seed_everything(3)
     model, data = OutDet(neighbours=3), mixture()
     run = trainer(max_epochs=1, enable_checkpointing=False)
@@ -144,9 +142,7 @@ def test_only_parts_that_are_named_are_measured() -> None:
     assert len(data.source("train")) == 12
 
 
-def test_the_record_holds_the_scans_of_all_parts(
-    tmp_path: Path, write: Callable[..., None]
-) -> None:
+def test_the_record_holds_the_scans_of_all_parts(tmp_path, write) -> None:
     for number in range(3):
         write(tmp_path / f"{number}.bin", tmp_path / f"{number}.label", [0, 110])
     files = Folder(str(tmp_path), "wads", train=["*.bin"])
@@ -219,7 +215,7 @@ def test_units_that_differ_are_refused_where_intensity_is_seen() -> None:
         ({"parts": {"all": mixture()}}, "part 'all': is a mixture itself"),
     ],
 )
-def test_what_makes_no_mixture_is_refused(options: dict[str, object], message: str) -> None:
+def test_what_makes_no_mixture_is_refused(options, message) -> None:
     with pytest.raises(InputError) as error:
         Mixture(**{"parts": {"snow": part(SNOW)}, **options})
     assert message in str(error.value)

@@ -1,7 +1,6 @@
 """Who reads which scan, and when: every one once, on any number of processes."""
 
 from collections import Counter
-from collections.abc import Callable
 from itertools import zip_longest
 
 import lightning
@@ -14,7 +13,6 @@ from torch.utils.data import BatchSampler
 
 from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.base import ScanDataModule
-from derain.datamodules.folder import Folder
 from derain.datamodules.order import Draws, MeasuringOrder, Pick, TrainingOrder, shared_out
 from derain.errors import InputError
 from derain.learning.batch import Batch
@@ -39,7 +37,7 @@ def orders(
 
 @given(SIZES, PROCESSES, st.integers(0, 9), st.integers(0, 2**32 - 1))
 def test_an_epoch_of_training_reads_every_scan_and_none_more_often_than_it_must(
-    scans: int, processes: int, epoch: int, seed: int
+    scans, processes, epoch, seed
 ) -> None:
     shares = orders(scans, processes, epoch, seed)
     (steps,) = {len(share) for share in shares}
@@ -63,7 +61,7 @@ def test_orders_differ_by_seed_and_epoch_and_put_no_scan_first() -> None:
 
 @given(SIZES, PROCESSES, st.integers(1, 7))
 def test_every_scan_is_measured_once_in_the_same_batches_on_any_number_of_processes(
-    scans: int, processes: int, batch_size: int
+    scans, processes, batch_size
 ) -> None:
     samplers = [
         MeasuringOrder(range(scans), batch_size, processes, own) for own in range(processes)
@@ -96,7 +94,7 @@ def same(one: Batch, other: Batch) -> bool:
 
 @pytest.mark.parametrize("workers", [0, 2])
 def test_scans_are_changed_by_seed_epoch_and_scan_whoever_reads_them_and_wherever_a_run_starts(
-    folder: Callable[..., Folder], connect: Callable[..., ScanDataModule], workers: int
+    folder, connect, workers
 ) -> None:
     lightning.seed_everything(3)
     here = connect(folder(augmentation=EVERYTHING, batch_size=2))
@@ -118,9 +116,7 @@ DATA_SETS = st.lists(st.integers(1, 12), min_size=1, max_size=4)
 
 
 @given(st.integers(0, 500), WEIGHTS)
-def test_shares_are_as_near_to_the_weights_as_whole_scans_can_be(
-    total: int, weights: list[float]
-) -> None:
+def test_shares_are_as_near_to_the_weights_as_whole_scans_can_be(total, weights) -> None:
     shares = shared_out(total, weights)
     assert sum(shares) == total
     exact = total * np.array(weights) / sum(weights)
@@ -128,9 +124,7 @@ def test_shares_are_as_near_to_the_weights_as_whole_scans_can_be(
 
 
 @given(DATA_SETS, st.integers(1, 30), st.integers(0, 20), st.integers(1, 4), st.integers(0, 99))
-def test_processes_draw_together_what_one_draws_alone(
-    sizes: list[int], drawn: int, epoch: int, processes: int, seed: int
-) -> None:
+def test_processes_draw_together_what_one_draws_alone(sizes, drawn, epoch, processes, seed) -> None:
     draws = Draws(tuple(sizes), (drawn,) * len(sizes))
     scans = sum(sizes)
     (alone,) = orders(scans, 1, epoch, seed, draws)
@@ -147,7 +141,7 @@ def test_processes_draw_together_what_one_draws_alone(
 
 
 @given(st.integers(1, 12), st.integers(1, 30), st.integers(1, 12))
-def test_no_scan_is_seen_twice_more_often_than_another(scans: int, drawn: int, epochs: int) -> None:
+def test_no_scan_is_seen_twice_more_often_than_another(scans, drawn, epochs) -> None:
     draws = Draws((3, scans), (2, drawn))
     seen = Counter(
         pick.number for epoch in range(epochs) for pick in draws.picks(seed=1, epoch=epoch)

@@ -1,6 +1,5 @@
 """Data sets of sequences are found where they were published, split as they were published."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -15,7 +14,7 @@ SPLIT = {"train": ["007", "003"], "validation": ["010"], "test": ["011"]}
 
 
 @pytest.fixture
-def root(tmp_path: Path, write: Callable[..., None]) -> Path:
+def root(tmp_path, write) -> Path:
     """Three sequences of two scans, and one whose scans have no labels."""
     for sequence in ("003", "007", "010", "011"):
         folder = tmp_path / "sequences" / sequence
@@ -42,7 +41,7 @@ def test_data_sets_are_split_and_counted_as_published() -> None:
     assert not Rehearse3D(root="somewhere").distinct
 
 
-def test_scans_come_in_the_order_of_the_split_with_their_labels(root: Path) -> None:
+def test_scans_come_in_the_order_of_the_split_with_their_labels(root) -> None:
     frames = Rehearse3D(root=str(root), split=SPLIT).frames("train")
     assert [(frame.path, frame.label_path) for frame in frames] == [
         (
@@ -54,7 +53,7 @@ def test_scans_come_in_the_order_of_the_split_with_their_labels(root: Path) -> N
     ]
 
 
-def test_prediction_is_on_the_test_scans_which_need_no_labels(root: Path) -> None:
+def test_prediction_is_on_the_test_scans_which_need_no_labels(root) -> None:
     data = Rehearse3D(root=str(root), split=SPLIT)
     frames = data.frames("predict")
     assert [frame.key for frame in frames] == ["000000", "000001"]
@@ -64,7 +63,7 @@ def test_prediction_is_on_the_test_scans_which_need_no_labels(root: Path) -> Non
         data.frames("test")
 
 
-def test_folders_can_have_other_names(tmp_path: Path, write: Callable[..., None]) -> None:
+def test_folders_can_have_other_names(tmp_path, write) -> None:
     label = tmp_path / "runs/17/truth/a.label"
     write(tmp_path / "runs/17/ouster/a.pcd", label)
     layout = Layout(sequences="runs", scans="ouster", labels="truth")
@@ -81,7 +80,7 @@ def test_folders_can_have_other_names(tmp_path: Path, write: Callable[..., None]
         ({"train": ["empty"]}, "train", "empty/lidar_radar_pcd: holds no scans"),
     ],
 )
-def test_a_part_without_scans_is_refused(root: Path, split: dict, part: str, message: str) -> None:
+def test_a_part_without_scans_is_refused(root, split, part, message) -> None:
     (root / "sequences/empty/lidar_radar_pcd").mkdir(parents=True)
     with pytest.raises(InputError, match=message) as refusal:
         Rehearse3D(root=str(root), split=split).frames(part)

@@ -1,7 +1,5 @@
 """Simulated rain is made where it is missing, and read like any other data set."""
 
-from pathlib import Path
-
 import pytest
 
 from derain.datamodules.base import ScanDataModule
@@ -21,7 +19,7 @@ WORLD = (
 
 
 @pytest.fixture(params=[Simulated, Worlds])
-def data(request: pytest.FixtureRequest, tmp_path: Path) -> ScanDataModule:
+def data(request, tmp_path) -> ScanDataModule:
     """A data set of two training sequences and one to validate, of a scan each."""
     try:
         import_open3d()
@@ -36,7 +34,7 @@ def data(request: pytest.FixtureRequest, tmp_path: Path) -> ScanDataModule:
     return Simulated(root, Campaign(2, 1, 0, scans=1, rain_rates=(50.0,), sensor=sensor))
 
 
-def test_a_data_set_is_made_once_and_labelled(data: ScanDataModule) -> None:
+def test_a_data_set_is_made_once_and_labelled(data) -> None:
     data.prepare_data()
     made = {file: file.stat().st_mtime_ns for file in data.root.rglob("*")}
     data.prepare_data()
@@ -50,7 +48,7 @@ def test_a_data_set_is_made_once_and_labelled(data: ScanDataModule) -> None:
         again.frames("test")
 
 
-def test_what_is_not_to_be_made_must_be_there(tmp_path: Path) -> None:
+def test_what_is_not_to_be_made_must_be_there(tmp_path) -> None:
     with pytest.raises(InputError, match="holds no complete simulated data set"):
         Simulated(str(tmp_path), make=False)
     write_manifest(tmp_path, {"made_by": MAKER, "files": {}})

@@ -24,7 +24,7 @@ def random_scan(seed: int, points: int) -> Scan:
 
 
 @given(st.lists(st.tuples(st.integers(0, 2**32), st.integers(0, 50)), min_size=1, max_size=5))
-def test_they_are_numpys_over_all_points_at_once(scans: list[tuple[int, int]]) -> None:
+def test_they_are_numpys_over_all_points_at_once(scans) -> None:
     drawn = [random_scan(seed, points) for seed, points in scans]
     columns = np.concatenate([np.c_[s.xyz, s.intensity, s.label][s.valid] for s in drawn])
     card = with_statistics(CARD, iter(drawn))

@@ -22,7 +22,7 @@ POINTS = 200
 
 
 @pytest.fixture
-def root(tmp_path: Path) -> Path:
+def root(tmp_path) -> Path:
     """Two taught sequences, whose own labels are garbage; of their ends nothing is known."""
     for name, scans in (("00", 7), ("01", 5)):
         for number in range(scans):
@@ -42,7 +42,7 @@ def keys(data: ScanDataModule, part: str) -> list[str]:
     return [frame.key for frame in data.source(part)]
 
 
-def test_the_ends_of_sequences_are_held_out(root: Path) -> None:
+def test_the_ends_of_sequences_are_held_out(root) -> None:
     data = Taught(str(root))
     assert keys(data, "train") == [
         *(f"00/velodyne/{number:06d}" for number in range(1, 5)),
@@ -52,7 +52,7 @@ def test_the_ends_of_sequences_are_held_out(root: Path) -> None:
         assert keys(data, part) == ["00/velodyne/000005", "01/velodyne/000003"]
 
 
-def test_scans_are_read_with_the_teachers_labels_and_as_it_saw_them(root: Path) -> None:
+def test_scans_are_read_with_the_teachers_labels_and_as_it_saw_them(root) -> None:
     data = Taught(str(root))
     frames = data.frames("train")
     scan = data.read(frames[1])
@@ -67,7 +67,7 @@ def test_scans_are_read_with_the_teachers_labels_and_as_it_saw_them(root: Path) 
     np.testing.assert_array_equal(data.card.rain_of(scan), known & rain)
 
 
-def test_commands_that_measure_know_the_folder(root: Path) -> None:
+def test_commands_that_measure_know_the_folder(root) -> None:
     card = card_of([root], None)
     assert card.name.endswith("taught by between")
     data = labelled_scans([root], card, Loading())
@@ -76,12 +76,12 @@ def test_commands_that_measure_know_the_folder(root: Path) -> None:
         labelled_scans([root, root], card, Loading())
 
 
-def test_what_is_no_such_folder_is_refused(tmp_path: Path) -> None:
+def test_what_is_no_such_folder_is_refused(tmp_path) -> None:
     with pytest.raises(InputError, match=TAUGHT_MANIFEST):
         Taught(str(tmp_path))
 
 
-def test_without_a_held_out_scan_there_is_none_to_measure(tmp_path: Path) -> None:
+def test_without_a_held_out_scan_there_is_none_to_measure(tmp_path) -> None:
     scene(POINTS).tofile(tmp_path / "0.bin")
     write_labels(tmp_path / "0.label", np.zeros(POINTS, int))
     teach(FilterDerainer(DROR(), 1), named_frames([tmp_path / "0.bin"]), tmp_path / "taught")
@@ -91,9 +91,7 @@ def test_without_a_held_out_scan_there_is_none_to_measure(tmp_path: Path) -> Non
         data.source("test")
 
 
-def test_an_epoch_of_a_short_recording_shows_each_scan_as_often_as_any_other(
-    root: Path, connect
-) -> None:
+def test_an_epoch_of_a_short_recording_shows_each_scan_as_often_as_any_other(root, connect) -> None:
     data = connect(Taught(str(root)))
     loader = data.train_dataloader()
     shown = [sample.cells for sample in loader]

@@ -28,7 +28,7 @@ def directions(xyz: NDArray[np.float32]) -> NDArray[np.float64]:
 
 @pytest.mark.parametrize("name", ALL_CHANGES)
 @pytest.mark.parametrize("seed", range(3))
-def test_points_stay_near_their_places_beside_labels_and_intensities(name: str, seed: int) -> None:
+def test_points_stay_near_their_places_beside_labels_and_intensities(name, seed) -> None:
     scan = street()
     changed = ALL_CHANGES[name](scan, np.random.default_rng(seed))
     assert changed.label is not None

@@ -53,9 +53,7 @@ def which(scan: Scan) -> int:
     ("number", "before", "after"),
     [(0, [], [1]), (1, [0], [2]), (3, [1, 2], []), (4, [], [5]), (6, [4, 5], [])],
 )
-def test_scans_around_one_are_of_its_sequence_the_oldest_first(
-    number: int, before: list[int], after: list[int]
-) -> None:
+def test_scans_around_one_are_of_its_sequence_the_oldest_first(number, before, after) -> None:
     frames, told = drives(4, 3), []
     view: Any = SimpleNamespace(window=Window(before=2, after=1), of_window=told.append)
     view_in_window(view, frames[number].read(), frames, number, lambda frame: frame.read())
@@ -78,7 +76,7 @@ def test_a_window_reaches_over_no_gap() -> None:
     assert around == [[0, 1], [0, 1], [3, 4], [3, 4]]
 
 
-def test_a_loader_gives_a_network_its_windows(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_loader_gives_a_network_its_windows(monkeypatch) -> None:
     data = InMemory(drives(3, 2), card="wads")
     task = agree_on_task(OutDet(), data)
     windows: list[WindowOfScans] = []

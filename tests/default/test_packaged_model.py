@@ -1,7 +1,6 @@
 """The model that comes with derain: it is the one of its card, or it is refused."""
 
 import shutil
-from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
 
@@ -30,7 +29,7 @@ LARGEST = 2_000_000
 
 
 @pytest.fixture
-def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def installed(tmp_path, monkeypatch) -> Path:
     """A copy of the model's folder, in place of the installed one."""
     folder = tmp_path / "installed"
     folder.mkdir()
@@ -61,7 +60,7 @@ def test_without_a_name_it_is_the_model_and_judges_as_its_file_does() -> None:
 
 
 @pytest.mark.parametrize("change", [b"", b"more", None])
-def test_a_changed_file_is_refused(installed: Path, change: bytes | None) -> None:
+def test_a_changed_file_is_refused(installed, change) -> None:
     model = installed / "model.onnx"
     if change is None:
         content = bytearray(model.read_bytes())
@@ -85,7 +84,7 @@ def test_a_changed_file_is_refused(installed: Path, change: bytes | None) -> Non
         ("card.yaml", default_model),
     ],
 )
-def test_a_missing_file_is_named(installed: Path, name: str, find: Callable[[], object]) -> None:
+def test_a_missing_file_is_named(installed, name, find) -> None:
     (installed / name).unlink()
     with pytest.raises(InputError, match=r"model that comes with derain is missing\. Install"):
         find()
@@ -116,7 +115,7 @@ def test_the_checkpoint_is_of_the_same_model() -> None:
         ("better", "yes", "there is no such key"),
     ],
 )
-def test_a_damaged_card_is_refused(installed: Path, key: str, value: object, reason: str) -> None:
+def test_a_damaged_card_is_refused(installed, key, value, reason) -> None:
     path = installed / "card.yaml"
     content = yaml.safe_load(path.read_text("utf-8"))
     content[key] = value

@@ -3,7 +3,7 @@
 import io
 import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import redirect_stdout
 from importlib.util import find_spec
 from pathlib import Path
@@ -19,8 +19,6 @@ from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
 from derain.export.bench import bench
 from derain.export.bench.cost import measure_in_process
-from derain.models.outdet import OutDet
-from derain.models.salsanext import SalsaNextModule
 from derain.scan import Scan
 
 from .pages import PAGES, REPOSITORY, Snippet, snippets
@@ -54,11 +52,7 @@ def name_of(page: Path) -> str:
 
 @pytest.fixture
 def page_folder(
-    tmp_path: Path,
-    made_once: Callable[..., Path],
-    random_outdet: OutDet,
-    random_salsanext: SalsaNextModule,
-    monkeypatch: pytest.MonkeyPatch,
+    tmp_path, made_once, random_outdet, random_salsanext, monkeypatch
 ) -> Iterator[Path]:
     """The folder that a page is run in, in a process which proves and times little."""
     prepare(tmp_path, made_once("documented_drive", write_drive))
@@ -75,7 +69,7 @@ def page_folder(
 
 @pytest.mark.usefixtures("one_block")
 @pytest.mark.parametrize("page", WITH_SNIPPETS, ids=name_of)
-def test_a_page_runs_from_its_first_snippet_to_its_last(page: Path, page_folder: Path) -> None:
+def test_a_page_runs_from_its_first_snippet_to_its_last(page, page_folder) -> None:
     namespace: dict[str, Any] = {}
     for snippet in BY_PAGE[page]:
         if not snippet.not_run:
@@ -114,7 +108,7 @@ def same(expected: str, printed: str) -> bool:
 
 
 @pytest.mark.parametrize("snippet", NOT_RUN, ids=lambda snippet: snippet.place)
-def test_what_is_not_run_has_a_reason_and_options_that_there_are(snippet: Snippet) -> None:
+def test_what_is_not_run_has_a_reason_and_options_that_there_are(snippet) -> None:
     for line in snippet.commands:
         words = snippet.arguments(line)
         if words[0] == "derain":
@@ -126,7 +120,7 @@ def test_what_is_not_run_has_a_reason_and_options_that_there_are(snippet: Snippe
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
-def test_commands_stand_in_fences(page: Path) -> None:
+def test_commands_stand_in_fences(page) -> None:
     """Indented, they would be run by nobody."""
     text = re.sub(r"^```.*?^```$", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
     assert not re.findall(r"^ {4}(?:derain|pip|python3?|make|tensorboard) .*", text, re.MULTILINE)

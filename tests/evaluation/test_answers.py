@@ -24,7 +24,7 @@ from derain.sources.frame import MemoryFrame
 
 
 @pytest.fixture
-def judged(scans: list[Scan]) -> list[tuple[Scan, np.ndarray]]:
+def judged(scans) -> list[tuple[Scan, np.ndarray]]:
     """Labelled scans, with rows that cannot be judged, and what a student calls rain in them."""
     rng = np.random.default_rng(0)
     for scan in scans:
@@ -33,9 +33,7 @@ def judged(scans: list[Scan]) -> list[tuple[Scan, np.ndarray]]:
     return [(scan, rng.random(len(scan)) < 0.3) for scan in scans]
 
 
-def test_every_point_that_can_be_judged_is_counted_once(
-    judged: list[tuple[Scan, np.ndarray]], card: DataCard
-) -> None:
+def test_every_point_that_can_be_judged_is_counted_once(judged, card) -> None:
     answers = total([Answers.of(scan, card, called) for scan, called in judged])
     expected = np.zeros_like(answers.table)
     for scan, called in judged:
@@ -47,9 +45,7 @@ def test_every_point_that_can_be_judged_is_counted_once(
     assert answers.points == sum(scan.valid.sum() for scan, _ in judged)
 
 
-def test_shares_and_agreement_are_those_of_the_points(
-    judged: list[tuple[Scan, np.ndarray]], card: DataCard
-) -> None:
+def test_shares_and_agreement_are_those_of_the_points(judged, card) -> None:
     scan, called = judged[0]
     answers = Answers.of(scan, card, called)
     valid, answer = scan.valid, answer_of(scan, card)
@@ -62,7 +58,7 @@ def test_shares_and_agreement_are_those_of_the_points(
 
 
 def test_without_a_student_nothing_is_removed_and_of_no_points_no_share_is_defined(
-    scans: list[Scan], card: DataCard
+    scans, card
 ) -> None:
     assert Answers.of(scans[0], card).removed == 0
     for answers in (Answers.of(scans[0].take([]), card), total([])):

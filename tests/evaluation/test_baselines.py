@@ -1,7 +1,5 @@
 """The baselines, against a search through all choices of voxels and through all rules."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -35,7 +33,7 @@ def truths(draw: st.DrawFn) -> list[Truth]:
 
 
 @given(truths())
-def test_no_other_choice_by_share_is_better_on_the_training_scans(scans: list[Truth]) -> None:
+def test_no_other_choice_by_share_is_better_on_the_training_scans(scans) -> None:
     x = np.concatenate([scan.xyz[:, 0] for scan, _ in scans])
     rain = np.concatenate([rain for _, rain in scans])
     prior = PositionPrior.learn(scans)
@@ -81,9 +79,7 @@ def random_scan(seed: int, points: int, levels: int = 1000) -> tuple[Scan, NDArr
 
 
 @given(st.integers(0, 2**32), st.integers(1, 30), st.integers(1, 3), st.sampled_from([6, 1000]))
-def test_no_other_rule_is_better_than_the_best(
-    seed: int, points: int, scans: int, levels: int
-) -> None:
+def test_no_other_rule_is_better_than_the_best(seed, points, scans, levels) -> None:
     truth = [random_scan(seed + number, points, levels) for number in range(scans)]
     whole = Scan.of(np.concatenate([np.c_[scan.xyz, scan.intensity] for scan, _ in truth]))
     rain = np.concatenate([rain for _, rain in truth])
@@ -104,7 +100,7 @@ def test_a_scan_without_intensity_has_no_dim_points_and_teaches_nothing() -> Non
     assert not IntensityRule.best([untaught])(taught[0]).any()
 
 
-def test_on_real_snow_the_rule_reaches_its_published_quality(shared: Path) -> None:
+def test_on_real_snow_the_rule_reaches_its_published_quality(shared) -> None:
     points = np.fromfile(shared / "data/wads/sample.bin", np.float32).reshape(-1, 4)
     snow = np.fromfile(shared / "data/wads/sample.label", np.uint32) & 0xFFFF == 110
     scan = Scan.of(points)

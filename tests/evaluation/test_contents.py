@@ -35,9 +35,7 @@ def record(sequence: Path, text: str, stem: str = "000000") -> None:
 
 @pytest.mark.parametrize("layout", [REHEARSE3D, Layout()])
 @pytest.mark.parametrize("root", ["", "sequences", "sequences/000", "sequences/000/{scans}"])
-def test_sequences_are_found_from_the_root_to_the_sequence(
-    tmp_path: Path, layout: Layout, root: str
-) -> None:
+def test_sequences_are_found_from_the_root_to_the_sequence(tmp_path, layout, root) -> None:
     for name in ("001", "000", ".002"):  # the last is not finished, and not counted
         add_scan(tmp_path / "sequences" / name, layout, "000001", [0] * 10)
         add_scan(tmp_path / "sequences" / name, layout, "000000", [0] * 10)
@@ -50,9 +48,7 @@ def test_sequences_are_found_from_the_root_to_the_sequence(
     assert sequences[0].rain_rate is None
 
 
-def test_a_folder_of_scans_is_one_sequence_and_other_folders_have_to_be_named(
-    tmp_path: Path,
-) -> None:
+def test_a_folder_of_scans_is_one_sequence_and_other_folders_have_to_be_named(tmp_path) -> None:
     write_scan(tmp_path / "scan.ply", Scan.of(scene(30)))
     (sequence,) = find_sequences(tmp_path, None)
     assert [frame.name for frame in sequence.frames] == [str(tmp_path / "scan.ply")]
@@ -64,7 +60,7 @@ def test_a_folder_of_scans_is_one_sequence_and_other_folders_have_to_be_named(
         find_sequences(tmp_path, Layout())
 
 
-def test_the_manifest_states_rain_rates_before_the_weather_does(tmp_path: Path) -> None:
+def test_the_manifest_states_rain_rates_before_the_weather_does(tmp_path) -> None:
     for name in ("000", "001", "002"):
         add_scan(tmp_path / "sequences" / name, REHEARSE3D, "000000", [0])
         record(tmp_path / "sequences" / name, "rain_rate_mm_h,wind\n9.0,1\n")
@@ -76,9 +72,7 @@ def test_the_manifest_states_rain_rates_before_the_weather_does(tmp_path: Path) 
     assert rates == [10, 11, None]
 
 
-def test_a_rain_gauge_that_fails_is_not_heeded_and_a_damaged_record_is_named(
-    tmp_path: Path,
-) -> None:
+def test_a_rain_gauge_that_fails_is_not_heeded_and_a_damaged_record_is_named(tmp_path) -> None:
     for name, rates in {"000": "nan\n9\ninf", "001": "nan"}.items():
         add_scan(tmp_path / name, REHEARSE3D, "000000", [0])
         record(tmp_path / name, f"rain_rate_mm_h\n{rates}\n")
@@ -89,7 +83,7 @@ def test_a_rain_gauge_that_fails_is_not_heeded_and_a_damaged_record_is_named(
         find_sequences(tmp_path, REHEARSE3D)
 
 
-def test_points_are_counted_by_class_and_instances_are_not(tmp_path: Path) -> None:
+def test_points_are_counted_by_class_and_instances_are_not(tmp_path) -> None:
     add_scan(tmp_path, REHEARSE3D, "0", [3, 0, 3, 300, 7])
     path = tmp_path / "lidar_radar_labels/0.label"
     write_labels(path, np.array([3, 0, 3, 300, 7]), np.arange(5))

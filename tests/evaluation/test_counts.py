@@ -31,7 +31,7 @@ approx = partial(pytest.approx, nan_ok=True)
 
 
 @given(st.lists(st.tuples(st.booleans(), st.booleans()), max_size=30))
-def test_every_point_is_counted_as_what_it_is(pairs: list[tuple[bool, bool]]) -> None:
+def test_every_point_is_counted_as_what_it_is(pairs) -> None:
     called_rain, rain = np.array(pairs, bool).reshape(-1, 2).T
     outcomes = [(True, True), (True, False), (False, True), (False, False)]
     counts = Counts.of(called_rain, rain)
@@ -69,7 +69,7 @@ def reference(truth: NDArray[np.bool_], called: NDArray[np.bool_]) -> list[float
 
 
 @pytest.mark.parametrize("points", [(), (0,), (1, 50, 50), (2, 2, 2, 2), (0, 40)])
-def test_scores_are_those_of_scikit_learn_and_all_counts_add_up(points: tuple[int, ...]) -> None:
+def test_scores_are_those_of_scikit_learn_and_all_counts_add_up(points) -> None:
     counts = RainCounts(CLASSES, RAIN, unknown=[255])
     truths, answers = [np.zeros(0, bool)], [np.zeros(0, bool)]
     for scan, called in (labelled(*one) for one in enumerate(points)):
@@ -148,7 +148,7 @@ def test_a_metric_counts_alike_in_any_precision_and_forgets_when_reset() -> None
 
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("times", [1, 2])
-def test_each_ray_counts_once_however_often_it_is_written(seed: int, times: int) -> None:
+def test_each_ray_counts_once_however_often_it_is_written(seed, times) -> None:
     recording = Recording(seed)
     rain = np.random.default_rng(seed).random(len(recording.ray)) < 0.3
     scan = Scan.of(np.tile(recording.xyz, (times, 1)))

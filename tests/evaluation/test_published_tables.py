@@ -4,14 +4,13 @@ from dataclasses import dataclass
 
 import pytest
 
-from derain.cards.card import DataCard, load_card
+from derain.cards.card import load_card
 from derain.errors import InputError
 from derain.evaluation.baselines import all_points
 from derain.evaluation.counts import Counts
 from derain.evaluation.published_tables import TABLES, paper_table, scans_by_group
 from derain.evaluation.scores import Scores, score
 from derain.export.bench.report import with_published_rows
-from derain.scan import Scan
 
 ROWS = [row for name in TABLES for row in paper_table(name).rows]
 
@@ -59,12 +58,12 @@ class OwnRow:
 
 
 @pytest.fixture
-def scores(scans: list[Scan], card: DataCard) -> Scores:
+def scores(scans, card) -> Scores:
     """What calling every point rain scores: of 880 known points, 90 are rain."""
     return score([all_points], scans, card)[0]
 
 
-def test_our_rows_stand_under_those_of_the_same_method(scores: Scores) -> None:
+def test_our_rows_stand_under_those_of_the_same_method(scores) -> None:
     names = {"all": "all", "dsor": "dsor", "DSOR, again": "dsor"}
     rows = [OwnRow(title, kind, scores) for title, kind in names.items()]
     text = with_published_rows(paper_table("table3"), {"heavy": rows}, load_card("rehearse3d"))
@@ -78,7 +77,7 @@ def test_our_rows_stand_under_those_of_the_same_method(scores: Scores) -> None:
     assert "(*)" not in text
 
 
-def test_our_scores_are_averaged_as_the_published_ones_they_stand_under(scores: Scores) -> None:
+def test_our_scores_are_averaged_as_the_published_ones_they_stand_under(scores) -> None:
     row = OwnRow("ours", "lisnownet", scores, milliseconds=float("nan"))
     text = with_published_rows(paper_table("table2"), {"test": [row]}, load_card("rehearse3d"))
     (own,) = [line for line in text.splitlines() if line.startswith("| ours")]
@@ -88,9 +87,7 @@ def test_our_scores_are_averaged_as_the_published_ones_they_stand_under(scores: 
     assert cells[3:] == [f"{iou:.2f}", "-", "scans"]
 
 
-def test_simulated_rain_stands_beside_simulated_rain_and_misprints_are_marked(
-    scores: Scores,
-) -> None:
+def test_simulated_rain_stands_beside_simulated_rain_and_misprints_are_marked(scores) -> None:
     ours = {name: [OwnRow("dsor", "dsor", scores)] for name in ("heavy", "medium", "light")}
     text = with_published_rows(paper_table("table3"), ours, load_card("simulated"))
     assert "Ours on simulated rain." in text

@@ -1,7 +1,7 @@
 """Models that examples are tried with."""
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from copy import deepcopy
 from dataclasses import replace
 from functools import partial
@@ -18,7 +18,7 @@ from .cpp import Program, build, missing_tools, program
 from .made_up_ros import EXAMPLE, DiagnosticArray, DiagnosticStatus, KeyValue, PointCloud2
 
 if TYPE_CHECKING:
-    from derain.models.outdet import OutDet
+    pass
 
 
 @pytest.fixture(scope="session")
@@ -28,7 +28,7 @@ def candidates() -> Candidates:
 
 
 @pytest.fixture(scope="session")
-def built(made_once: Callable[..., Path]) -> Path:
+def built(made_once) -> Path:
     """The folder in which the example in C++ was built."""
     if missing := missing_tools():
         pytest.skip(f"no {' and no '.join(missing)} to build the example with")
@@ -36,13 +36,13 @@ def built(made_once: Callable[..., Path]) -> Path:
 
 
 @pytest.fixture(scope="session")
-def show_view(built: Path) -> Program:
+def show_view(built) -> Program:
     """Its program that needs no onnxruntime."""
     return program(built / "show_view")
 
 
 @pytest.fixture(scope="session")
-def derain_onnx(built: Path) -> Program:
+def derain_onnx(built) -> Program:
     """The one that does."""
     if not (built / "derain_onnx").exists():
         pytest.skip(
@@ -53,9 +53,7 @@ def derain_onnx(built: Path) -> Program:
 
 
 @pytest.fixture(scope="session")
-def judging_candidates(
-    random_outdet: "OutDet", candidates: Candidates, made_once: Callable[..., Path]
-) -> Path:
+def judging_candidates(random_outdet, candidates, made_once) -> Path:
     """3D-OutDet of random weights, exported with those candidates."""
     from derain.export.onnx_file import export
 
@@ -77,7 +75,7 @@ def ros2_node() -> Iterator[ModuleType]:
 
 
 @pytest.fixture
-def ros(monkeypatch: pytest.MonkeyPatch) -> None:
+def ros(monkeypatch) -> None:
     """Modules of ROS, as much of them as the example imports."""
     modules = {
         "rclpy": {},

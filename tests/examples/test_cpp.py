@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import onnxruntime
 import pytest
-from numpy.typing import NDArray
 
 from derain.default import default_model
 from derain.evaluation.hard_cases import scene
@@ -21,7 +20,6 @@ from derain.views.neighbours import Neighbourhoods
 from derain.views.range_image import RangeImage
 from derain.views.view import ViewedScan
 
-from .cpp import Program
 from .hard_points import hard_scans
 
 KEPT = Path(__file__).parents[1] / "export" / "kept" / "outdet.onnx"
@@ -98,11 +96,7 @@ def same_view(folder: Path, view: ViewedScan) -> None:
     ],
 )
 def test_a_network_would_be_given_the_same_bit_for_bit(
-    show_view: Program,
-    specs: dict[str, Spec],
-    tmp_path: Path,
-    name: str,
-    points: NDArray[np.float32],
+    show_view, specs, tmp_path, name, points
 ) -> None:
     points.tofile(tmp_path / "scan.bin")
     metadata = metadata_at(tmp_path / "metadata.json", specs[name].as_dict())
@@ -112,9 +106,7 @@ def test_a_network_would_be_given_the_same_bit_for_bit(
 
 
 @pytest.mark.parametrize("name", ["intensity", "circle"])
-def test_and_so_it_is_for_a_real_scan(
-    show_view: Program, specs: dict[str, Spec], shared: Path, tmp_path: Path, name: str
-) -> None:
+def test_and_so_it_is_for_a_real_scan(show_view, specs, shared, tmp_path, name) -> None:
     scan = shared / "data" / "wads" / "sample.bin"
     metadata = metadata_at(tmp_path / "metadata.json", specs[name].as_dict())
     assert show_view(metadata, scan, tmp_path / "view").returncode == 0
@@ -136,11 +128,7 @@ def test_and_so_it_is_for_a_real_scan(
     ],
 )
 def test_a_model_that_it_does_not_know_is_refused(
-    show_view: Program,
-    specs: dict[str, Spec],
-    tmp_path: Path,
-    change: dict[str, Any],
-    reason: str,
+    show_view, specs, tmp_path, change, reason
 ) -> None:
     scene(50).tofile(tmp_path / "scan.bin")
     changed = {**specs["default"].as_dict(), **change}
@@ -151,7 +139,7 @@ def test_a_model_that_it_does_not_know_is_refused(
     assert not (tmp_path / "view").exists()
 
 
-def test_what_is_no_metadata_and_no_scan_is_refused(show_view: Program, tmp_path: Path) -> None:
+def test_what_is_no_metadata_and_no_scan_is_refused(show_view, tmp_path) -> None:
     metadata, scan = tmp_path / "metadata.json", tmp_path / "scan.bin"
     scene(50).tofile(scan)
     for text in ("", "{", '{"spec": {}} more', '{"spec": [1, 2', "[" * 10_000):

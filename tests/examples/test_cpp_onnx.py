@@ -14,7 +14,6 @@ from derain.evaluation.hard_cases import scene
 from derain.export.onnx_file import with_metadata
 from derain.export.runtime import Derainer
 from derain.views.back_projection import BACK_PROJECTIONS
-from derain.views.candidates import Candidates
 
 from .cpp import Program
 from .hard_points import hard_scans
@@ -42,15 +41,11 @@ def judged_alike(
 
 
 @pytest.mark.parametrize("model", [default_model(), KEPT], ids=["default", "outdet"])
-def test_it_calls_rain_what_derain_calls_rain(
-    derain_onnx: Program, tmp_path: Path, model: Path
-) -> None:
+def test_it_calls_rain_what_derain_calls_rain(derain_onnx, tmp_path, model) -> None:
     judged_alike(derain_onnx, tmp_path, model, [*SCANS.values(), scene()])
 
 
-def test_it_judges_candidates_as_well(
-    derain_onnx: Program, judging_candidates: Path, tmp_path: Path
-) -> None:
+def test_it_judges_candidates_as_well(derain_onnx, judging_candidates, tmp_path) -> None:
     points = SCANS["ties, copies, invalid rows"]
     judged_alike(derain_onnx, tmp_path, judging_candidates, [points])
     assert 0 < Derainer(judging_candidates, threads=1)(points).mean() < 1
@@ -59,12 +54,7 @@ def test_it_judges_candidates_as_well(
 @pytest.mark.parametrize("way_back", BACK_PROJECTIONS)
 @pytest.mark.parametrize("azimuth", [(-180.0, 180.0), (-60.0, 75.0)], ids=["circle", "sector"])
 def test_and_images_whichever_way_their_scores_come_back(
-    derain_onnx: Program,
-    salsanext_onnx: Path,
-    candidates: Candidates,
-    tmp_path: Path,
-    way_back: str,
-    azimuth: tuple[float, float],
+    derain_onnx, salsanext_onnx, candidates, tmp_path, way_back, azimuth
 ) -> None:
     proto, spec = onnx.load(salsanext_onnx), Derainer(salsanext_onnx).spec
     view = {**spec.view, "grid": {**spec.view["grid"], "azimuth": azimuth}, "way_back": way_back}
@@ -77,9 +67,7 @@ def test_and_images_whichever_way_their_scores_come_back(
 
 
 @pytest.mark.parametrize("text", [b'"numpy"', b'"sha256"'], ids=["versions", "checksum"])
-def test_a_model_that_has_changed_is_refused(
-    derain_onnx: Program, tmp_path: Path, text: bytes
-) -> None:
+def test_a_model_that_has_changed_is_refused(derain_onnx, tmp_path, text) -> None:
     scene(50).tofile(tmp_path / "scan.bin")
     model = tmp_path / "model.onnx"
     model.write_bytes(default_model().read_bytes().replace(text, text.upper()))
@@ -89,7 +77,7 @@ def test_a_model_that_has_changed_is_refused(
     assert not list(tmp_path.glob("out/*"))
 
 
-def test_a_file_that_is_no_model_of_derain_is_refused(derain_onnx: Program, tmp_path: Path) -> None:
+def test_a_file_that_is_no_model_of_derain_is_refused(derain_onnx, tmp_path) -> None:
     scene(50).tofile(tmp_path / "scan.bin")
     (tmp_path / "text.onnx").write_text("no model")
     spec = Derainer(KEPT).spec.as_dict()
@@ -109,7 +97,7 @@ def test_a_file_that_is_no_model_of_derain_is_refused(derain_onnx: Program, tmp_
         assert not list(tmp_path.glob("out/*"))
 
 
-def test_a_scan_is_never_overwritten(derain_onnx: Program, tmp_path: Path) -> None:
+def test_a_scan_is_never_overwritten(derain_onnx, tmp_path) -> None:
     scene(50).tofile(tmp_path / "scan.bin")
     done = derain_onnx(default_model(), tmp_path, tmp_path / "scan.bin")
     assert done.returncode == 2

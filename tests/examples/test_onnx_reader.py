@@ -8,7 +8,6 @@ from dataclasses import fields, replace
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 import numpy as np
 import onnx
@@ -21,7 +20,6 @@ from derain.export.onnx_file import with_metadata
 from derain.export.runtime import Derainer
 from derain.spec import Spec
 from derain.views.back_projection import BACK_PROJECTIONS
-from derain.views.candidates import Candidates
 from derain.views.view import VIEWS
 
 from .hard_points import hard_points, hard_scans
@@ -51,9 +49,7 @@ def agree(reader: ModuleType, path: Path, *scans: NDArray[np.float32]) -> None:
         np.testing.assert_array_equal(theirs.rain(points), judgement.rain)
 
 
-def test_of_neighbours_it_makes_what_derain_makes(
-    reader: ModuleType, judging_candidates: Path
-) -> None:
+def test_of_neighbours_it_makes_what_derain_makes(reader, judging_candidates) -> None:
     for model in (default_model(), judging_candidates, KEPT):  # the last of an early derain
         agree(reader, model, hard_points(), *SCANS.values())
     assert 0 < Derainer(default_model(), threads=1)(hard_points()).mean() < 0.9
@@ -62,12 +58,7 @@ def test_of_neighbours_it_makes_what_derain_makes(
 @pytest.mark.parametrize("way_back", BACK_PROJECTIONS)
 @pytest.mark.parametrize("azimuth", [(-180.0, 180.0), (-60.0, 75.0)], ids=["circle", "sector"])
 def test_of_images_it_makes_what_derain_makes_whichever_way_scores_come_back(
-    reader: ModuleType,
-    salsanext_onnx: Path,
-    tmp_path: Path,
-    way_back: str,
-    azimuth: tuple[float, float],
-    candidates: Candidates,
+    reader, salsanext_onnx, tmp_path, way_back, azimuth, candidates
 ) -> None:
     proto, spec = onnx.load(salsanext_onnx), Derainer(salsanext_onnx).spec
     grid = {**spec.view["grid"], "azimuth": azimuth}
@@ -86,9 +77,7 @@ def test_of_images_it_makes_what_derain_makes_whichever_way_scores_come_back(
     ],
     ids=["a former channel", "another view"],
 )
-def test_what_it_does_not_know_is_refused(
-    reader: ModuleType, tmp_path: Path, change: dict[str, Any]
-) -> None:
+def test_what_it_does_not_know_is_refused(reader, tmp_path, change) -> None:
     spec = replace(Derainer(default_model(), threads=1).spec, **change)
     model = with_metadata(onnx.load(default_model()), {"spec": spec.as_dict()})
     (tmp_path / "model.onnx").write_bytes(model)
@@ -97,16 +86,14 @@ def test_what_it_does_not_know_is_refused(
 
 
 @pytest.mark.parametrize("text", [b'"numpy"', b'"sha256"'], ids=["versions", "checksum"])
-def test_a_model_that_has_changed_is_refused(
-    reader: ModuleType, tmp_path: Path, text: bytes
-) -> None:
+def test_a_model_that_has_changed_is_refused(reader, tmp_path, text) -> None:
     model = tmp_path / "model.onnx"
     model.write_bytes(default_model().read_bytes().replace(text, text.upper()))
     with pytest.raises(SystemExit, match="its checksum differs or is missing"):
         reader.Model(str(model))
 
 
-def test_from_the_command_line_it_writes_labels(tmp_path: Path) -> None:
+def test_from_the_command_line_it_writes_labels(tmp_path) -> None:
     points = scene(300)
     points.tofile(tmp_path / "scan.bin")
     command = [sys.executable, EXAMPLE, default_model(), "scan.bin", "scan.label"]
@@ -129,9 +116,7 @@ def test_the_contract_names_all_that_a_file_may_hold() -> None:
     assert set(Derainer().metadata) <= named
 
 
-def test_the_python_of_the_contract_runs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_python_of_the_contract_runs(tmp_path, monkeypatch, capsys) -> None:
     (tmp_path / "model.onnx").write_bytes(default_model().read_bytes())
     monkeypatch.chdir(tmp_path)
     (snippet,) = re.findall(r"```python\n(.*?)```", CONTRACT, re.DOTALL)

@@ -27,9 +27,7 @@ def run_main(ros2_node: ModuleType, patch: pytest.MonkeyPatch, ros: Ros) -> int:
 
 @pytest.mark.usefixtures("ros")
 @pytest.mark.parametrize("ending", [None, KeyboardInterrupt(), ExternalShutdownError()])
-def test_it_runs_from_the_first_cloud_until_it_is_stopped(
-    ros2_node: ModuleType, monkeypatch: pytest.MonkeyPatch, ending: BaseException | None
-) -> None:
+def test_it_runs_from_the_first_cloud_until_it_is_stopped(ros2_node, monkeypatch, ending) -> None:
     monkeypatch.setattr(ros2_node, "MOST_RAIN", 1.0)  # of so few points much is called rain
     message = message_of(scene(300))
     ros = Ros(Node(model=str(KEPT), threads=1), [message, message], ending)
@@ -52,10 +50,7 @@ def test_it_runs_from_the_first_cloud_until_it_is_stopped(
     ],
 )
 def test_what_it_cannot_run_with_is_said_once_and_ends_it(
-    ros2_node: ModuleType,
-    monkeypatch: pytest.MonkeyPatch,
-    parameters: dict[str, str | int],
-    reason: str,
+    ros2_node, monkeypatch, parameters, reason
 ) -> None:
     ros = Ros(Node(threads=1, **parameters), [])
     assert run_main(ros2_node, monkeypatch, ros) == 2
@@ -65,9 +60,7 @@ def test_what_it_cannot_run_with_is_said_once_and_ends_it(
 
 
 @pytest.mark.usefixtures("ros")
-def test_a_fault_ends_it_unless_it_is_being_stopped(
-    ros2_node: ModuleType, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_fault_ends_it_unless_it_is_being_stopped(ros2_node, monkeypatch) -> None:
     fault = RuntimeError("publisher's context is invalid")
     ros = Ros(Node(threads=1), [], fault)
     with pytest.raises(RuntimeError, match="context is invalid"):
@@ -77,9 +70,7 @@ def test_a_fault_ends_it_unless_it_is_being_stopped(
     assert run_main(ros2_node, monkeypatch, stopped) == 0
 
 
-def test_the_launch_file_says_parameters_of_the_node(
-    ros2_node: ModuleType, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_launch_file_says_parameters_of_the_node(ros2_node, monkeypatch) -> None:
     made = {
         "launch": "LaunchDescription",
         "launch.actions": "DeclareLaunchArgument",

@@ -34,9 +34,7 @@ def bytes_of_points(message: PointCloud2) -> NDArray[np.void]:
 
 
 @pytest.mark.parametrize(("height", "gap"), [(1, 0), (4, 0), (4, 9)])
-def test_every_byte_of_the_points_that_stay_stays(
-    ros2_node: ModuleType, height: int, gap: int
-) -> None:
+def test_every_byte_of_the_points_that_stay_stays(ros2_node, height, gap) -> None:
     message = message_of(scene(200), height, gap)
     rain = np.random.default_rng(1).random(200) < 0.3
     before = bytes_of_points(message)
@@ -52,7 +50,7 @@ def test_every_byte_of_the_points_that_stay_stays(
             assert getattr(result, name) is getattr(message, name)
 
 
-def test_of_an_organised_cloud_rain_becomes_nan_in_its_place(ros2_node: ModuleType) -> None:
+def test_of_an_organised_cloud_rain_becomes_nan_in_its_place(ros2_node) -> None:
     message = message_of(scene(200), height=4, gap=9)
     rain = np.zeros(200, bool)
     rain[[3, 70, 199]] = True
@@ -65,14 +63,14 @@ def test_of_an_organised_cloud_rain_becomes_nan_in_its_place(ros2_node: ModuleTy
     np.testing.assert_array_equal(after["ring"], before["ring"])
 
 
-def test_a_cloud_without_rain_is_the_same_cloud(ros2_node: ModuleType) -> None:
+def test_a_cloud_without_rain_is_the_same_cloud(ros2_node) -> None:
     message = message_of(scene(200), height=4)
     result = ros2_node.cleaned(message, np.zeros(200, bool))
     assert result == message
     assert result is not message
 
 
-def test_what_is_odd_is_told_once(ros2_node: ModuleType) -> None:
+def test_what_is_odd_is_told_once(ros2_node) -> None:
     points = scene(600)
     points[:, 3] = 5  # which no sensor measured
     remover = ros2_node.RainRemover(Derainer(KEPT, threads=1))
@@ -82,9 +80,7 @@ def test_what_is_odd_is_told_once(ros2_node: ModuleType) -> None:
 
 
 @pytest.mark.usefixtures("ros")
-def test_a_cloud_comes_in_and_goes_out_clean(
-    ros2_node: ModuleType, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_cloud_comes_in_and_goes_out_clean(ros2_node, monkeypatch) -> None:
     monkeypatch.setattr(ros2_node, "MOST_RAIN", 1.0)  # of so few points much is called rain
     points = scene(600)
     message = message_of(points)
@@ -104,7 +100,7 @@ def test_a_cloud_comes_in_and_goes_out_clean(
 @pytest.mark.usefixtures("ros")
 @pytest.mark.parametrize(("share", "stay"), [(0.35, 130), (0.36, 200)])
 def test_a_cloud_that_would_lose_too_much_goes_out_whole(
-    ros2_node: ModuleType, monkeypatch: pytest.MonkeyPatch, share: float, stay: int
+    ros2_node, monkeypatch, share, stay
 ) -> None:
     calling_rain(monkeypatch, ros2_node, np.arange(200) < 200 * share)
     node = Node(model=str(KEPT), threads=1, removed="gone")
@@ -133,9 +129,7 @@ def level_after(ros2_node: ModuleType, points: NDArray[np.float32], dry: str = "
 
 
 @pytest.mark.usefixtures("ros")
-def test_its_level_is_that_of_the_weather(
-    ros2_node: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_its_level_is_that_of_the_weather(ros2_node, monkeypatch, tmp_path) -> None:
     points = scene(2000)
     points[:400, :3] *= 3 / np.linalg.norm(points[:400, :3], axis=1, keepdims=True)
     for drops, level in ((0, "OK"), (400, "ERROR")):
@@ -151,7 +145,7 @@ def test_its_level_is_that_of_the_weather(
 
 
 @pytest.mark.usefixtures("ros")
-def test_by_default_it_runs_the_packaged_model_and_publishes_no_rain(ros2_node: ModuleType) -> None:
+def test_by_default_it_runs_the_packaged_model_and_publishes_no_rain(ros2_node) -> None:
     node = Node()
     made = ros2_node.DerainNode(node)
     assert made.remover.derainer.name == "default"
@@ -160,9 +154,7 @@ def test_by_default_it_runs_the_packaged_model_and_publishes_no_rain(ros2_node: 
 
 
 @pytest.mark.usefixtures("ros")
-def test_a_cloud_that_cannot_be_read_is_logged_and_the_next_one_is_cleaned(
-    ros2_node: ModuleType,
-) -> None:
+def test_a_cloud_that_cannot_be_read_is_logged_and_the_next_one_is_cleaned(ros2_node) -> None:
     node = Node(model=str(KEPT), threads=1)
     ros2_node.DerainNode(node)
     _, call, _ = node.subscriptions["points"]
@@ -181,7 +173,7 @@ def test_a_cloud_that_cannot_be_read_is_logged_and_the_next_one_is_cleaned(
 
 
 @pytest.mark.usefixtures("ros")
-def test_once_a_second_it_says_what_share_was_rain(ros2_node: ModuleType) -> None:
+def test_once_a_second_it_says_what_share_was_rain(ros2_node) -> None:
     points = scene(600)
     node = Node(model=str(KEPT), threads=1)
     ros2_node.DerainNode(node)

@@ -42,7 +42,7 @@ def started(folder: Path) -> list[str]:
     return words[words.index("torchrun") + 1 :]
 
 
-def test_the_script_starts_torchrun_and_goes_on_from_the_last_checkpoint(tmp_path: Path) -> None:
+def test_the_script_starts_torchrun_and_goes_on_from_the_last_checkpoint(tmp_path) -> None:
     told = get_args_parser().parse_args(started(tmp_path))
     assert (told.nnodes, told.nproc_per_node, told.no_python) == ("2", "4", True)
     assert told.rdzv_endpoint == "node07:24321"

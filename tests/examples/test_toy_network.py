@@ -37,7 +37,7 @@ def toy_network() -> Iterator[ModuleType]:
 
 
 @pytest.fixture(scope="module")
-def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def root(tmp_path_factory) -> Path:
     """Four made-up scans in the layout of WADS: two to train on, one to validate, one to test."""
     root = tmp_path_factory.mktemp("WADS")
     for number in range(4):
@@ -50,7 +50,7 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def data(root: Path) -> list[str]:
+def data(root) -> list[str]:
     """Options that name those scans, and the network by its class."""
     split = '{train: ["00", "01"], validation: ["02"], test: ["03"]}'
     return [
@@ -63,7 +63,7 @@ def data(root: Path) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def checkpoint(toy_network: ModuleType, root: Path, data: list[str]) -> Path:
+def checkpoint(toy_network, root, data) -> Path:
     """What ``derain fit`` makes of it."""
     assert main(["fit", *data, "--trainer.max_epochs", "20"]) == 0
     (best,) = root.glob("runs/**/best.ckpt")
@@ -71,14 +71,14 @@ def checkpoint(toy_network: ModuleType, root: Path, data: list[str]) -> Path:
 
 
 @pytest.fixture(scope="module")
-def model(checkpoint: Path, root: Path) -> Path:
+def model(checkpoint, root) -> Path:
     """What ``derain export`` makes of that."""
     out = root / "toy.onnx"
     assert main(["export", str(checkpoint), "--out", str(out), "--repeats", "1"]) == 0
     return out
 
 
-def test_it_learns_and_is_tested(run_derain, checkpoint: Path, data: list[str]) -> None:
+def test_it_learns_and_is_tested(run_derain, checkpoint, data) -> None:
     outcome = run_derain("test", *data, "--ckpt_path", checkpoint)
     assert outcome.code == 0, outcome.err
     loaded = load_model(checkpoint)
@@ -87,15 +87,13 @@ def test_it_learns_and_is_tested(run_derain, checkpoint: Path, data: list[str]) 
     assert loaded.spec.channels == ("z", "intensity")
 
 
-def test_it_is_exported_with_the_proof_of_every_hard_case(model: Path) -> None:
+def test_it_is_exported_with_the_proof_of_every_hard_case(model) -> None:
     cases = Derainer(model).metadata["proof"]["cases"]
     assert [case["name"] for case in cases] == [name for name, _ in hard_cases() for _ in THREADS]
     assert all(case["finite"] for case in cases)
 
 
-def test_what_it_learnt_is_rain_in_scans_it_never_saw(
-    run_derain, model: Path, tmp_path: Path
-) -> None:
+def test_what_it_learnt_is_rain_in_scans_it_never_saw(run_derain, model, tmp_path) -> None:
     scan = tmp_path / "scan.bin"
     scene(300, seed=9).tofile(scan)
     outcome = run_derain("run", model, scan, "--out", tmp_path / "out")
@@ -104,9 +102,7 @@ def test_what_it_learnt_is_rain_in_scans_it_never_saw(
     assert (rain & DROPS).sum() / (rain | DROPS).sum() > 0.8
 
 
-def test_it_is_benched_beside_others(
-    run_derain, model: Path, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_it_is_benched_beside_others(run_derain, model, root, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(bench, "measure_cost", measure_in_process)
     options = ["--card", "wads", "--timed", "1", "--repeats", "1", "--out", tmp_path / "out"]
     test = root / "sequences/03/velodyne"
@@ -117,7 +113,7 @@ def test_it_is_benched_beside_others(
     assert iou["toy"] > 0.8 > iou["none"]
 
 
-def test_nothing_of_it_was_published(run_derain, toy_network: ModuleType, tmp_path: Path) -> None:
+def test_nothing_of_it_was_published(run_derain, toy_network, tmp_path) -> None:
     out = tmp_path / "toy.ckpt"
     outcome = run_derain("import-weights", "toy", "toy.pt", "--stats", "wads", "--out", out)
     assert (outcome.code, outcome.out) == (2, "")
@@ -127,7 +123,7 @@ def test_nothing_of_it_was_published(run_derain, toy_network: ModuleType, tmp_pa
 
 
 def test_without_the_package_that_brings_it_its_checkpoint_is_refused(
-    run_derain, checkpoint: Path, monkeypatch: pytest.MonkeyPatch
+    run_derain, checkpoint, monkeypatch
 ) -> None:
     known = {name: network for name, network in NETWORKS.items() if name != "toy"}
     monkeypatch.setattr(NETWORKS, "_members", known)

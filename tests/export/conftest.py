@@ -38,7 +38,7 @@ class RainySession(Session):
 
 
 @pytest.fixture
-def rainy(monkeypatch: pytest.MonkeyPatch) -> type[Session]:
+def rainy(monkeypatch) -> type[Session]:
     """A runtime of that name for the length of a test."""
     monkeypatch.setattr(RUNTIMES, "_members", dict(RUNTIMES))
     return RUNTIMES.add("rainy")(RainySession)

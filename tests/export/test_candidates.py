@@ -1,6 +1,5 @@
 """A model judges its candidates as it does without bounds, and nothing else is rain."""
 
-from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import replace
 from functools import partial
@@ -17,7 +16,6 @@ from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export.candidates import fit_network_candidates
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
-from derain.models.outdet import OutDet
 from derain.scan import Scan
 from derain.views.candidates import Bound, Candidates
 
@@ -26,7 +24,7 @@ WADS = load_card("wads")
 
 
 @pytest.fixture(scope="module")
-def judging_candidates(random_outdet: OutDet, made_once: Callable[..., Path]) -> Path:
+def judging_candidates(random_outdet, made_once) -> Path:
     """The same network as ``onnx_model``, exported with candidates."""
     model = deepcopy(random_outdet)
     model.adopt(replace(model.spec, candidates=NEAR_AND_DIM))
@@ -36,7 +34,7 @@ def judging_candidates(random_outdet: OutDet, made_once: Callable[..., Path]) ->
 
 
 def test_its_answer_for_candidates_is_bit_for_bit_that_of_the_model_without(
-    onnx_model: Path, judging_candidates: Path
+    onnx_model, judging_candidates
 ) -> None:
     of_all, of_candidates = Derainer(onnx_model, 1), Derainer(judging_candidates, 1)
     judged = 0
@@ -73,7 +71,7 @@ def labelled() -> list[Scan]:
 
 
 def test_they_are_fitted_to_the_rain_that_the_network_finds(
-    random_outdet: OutDet, onnx_model: Path, labelled: list[Scan]
+    random_outdet, onnx_model, labelled
 ) -> None:
     card = replace(WADS, unknown=(0,))
     fitted = fit_network_candidates(random_outdet, labelled, card, inside=0.9)
@@ -95,7 +93,7 @@ def test_they_are_fitted_to_the_rain_that_the_network_finds(
     assert fitted.candidates.rain_share == bounded.precision
 
 
-def test_bounds_of_nothing_are_refused(random_outdet: OutDet, labelled: list[Scan]) -> None:
+def test_bounds_of_nothing_are_refused(random_outdet, labelled) -> None:
     dry = [scan.with_label(np.full(len(scan), 40)) for scan in labelled]
     with pytest.raises(InputError, match=r"--candidates: no point of these scans is falling-snow"):
         fit_network_candidates(random_outdet, dry, WADS)
@@ -106,7 +104,7 @@ def test_bounds_of_nothing_are_refused(random_outdet: OutDet, labelled: list[Sca
 
 
 def test_a_model_that_was_trained_with_candidates_stays_within_them(
-    random_outdet: OutDet, labelled: list[Scan]
+    random_outdet, labelled
 ) -> None:
     model = deepcopy(random_outdet)
     model.adopt(replace(model.spec, candidates=Candidates((Bound("range", most=8.0),))))

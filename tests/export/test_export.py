@@ -3,7 +3,6 @@
 from contextlib import nullcontext
 from copy import deepcopy
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import onnx
@@ -25,9 +24,7 @@ from derain.scan import Scan
 SCENE = [("scene", Scan.of(scene()))]
 
 
-def test_the_file_holds_a_whole_network_and_how_it_is_used(
-    onnx_model: Path, random_outdet: OutDet
-) -> None:
+def test_the_file_holds_a_whole_network_and_how_it_is_used(onnx_model, random_outdet) -> None:
     beside = {file.name for file in onnx_model.parent.glob(f"{onnx_model.name}*")}
     assert beside <= {onnx_model.name, f"{onnx_model.name}.lock"}
     proto = onnx.load(onnx_model, load_external_data=False)
@@ -57,9 +54,7 @@ def test_the_file_holds_a_whole_network_and_how_it_is_used(
 
 
 @pytest.mark.parametrize("offset", [1e-3, 0.5])
-def test_a_difference_of_the_logits_is_found_to_its_size(
-    onnx_model: Path, random_outdet: OutDet, offset: float
-) -> None:
+def test_a_difference_of_the_logits_is_found_to_its_size(onnx_model, random_outdet, offset) -> None:
     def shifted(**inputs: Tensor) -> Tensor:
         return random_outdet(**inputs) + torch.tensor([0.0, offset])
 
@@ -78,9 +73,7 @@ def test_a_difference_of_the_logits_is_found_to_its_size(
     assert {case.flipped for case in proof.cases} == {flipped.sum()}
 
 
-def test_what_is_not_a_number_differs_as_much_as_can_be(
-    onnx_model: Path, random_outdet: OutDet
-) -> None:
+def test_what_is_not_a_number_differs_as_much_as_can_be(onnx_model, random_outdet) -> None:
     def partly_undefined(**inputs: Tensor) -> Tensor:
         logits = random_outdet(**inputs)
         logits[7] = torch.nan
@@ -106,7 +99,7 @@ def test_what_is_not_a_number_differs_as_much_as_can_be(
         ({"finite": False, "bounds": FINITE}, False),
     ],
 )
-def test_a_case_holds_within_its_bounds_only(change: dict[str, float], holds: bool) -> None:
+def test_a_case_holds_within_its_bounds_only(change, holds) -> None:
     case = Case(
         "case", points=round(2 / FLOAT32.flipped), threads=1, difference=0, flipped=0, finite=True
     )
@@ -124,9 +117,7 @@ def test_a_case_holds_within_its_bounds_only(change: dict[str, float], holds: bo
     ],
     ids=str,
 )
-def test_in_eight_bits_seven_tenths_of_the_rain_is_found_alike(
-    found: list[tuple[int, int]], holds: bool
-) -> None:
+def test_in_eight_bits_seven_tenths_of_the_rain_is_found_alike(found, holds) -> None:
     # Of 10,000 cells: what changes is no twentieth of them.
     cases = [
         Case("scan", 10_000, 1, 0.1, either - both, True, both, either, INT8)
@@ -153,7 +144,7 @@ class SpoiltFarAway(nn.Module):
 
 
 @pytest.fixture
-def few_cases(monkeypatch: pytest.MonkeyPatch) -> None:
+def few_cases(monkeypatch) -> None:
     """Shortens the proof to a case that the spoilt network passes and one that it does not."""
     few = [case for case in hard_cases() if case[0] in ("intensity 0", "range 1e4 m")]
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: few)
@@ -161,7 +152,7 @@ def few_cases(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("few_cases", "one_block")
 def test_an_older_file_stays_as_it_was_when_the_exported_network_is_wrong(
-    tmp_path: Path, random_outdet: OutDet, monkeypatch: pytest.MonkeyPatch
+    tmp_path, random_outdet, monkeypatch
 ) -> None:
     path = tmp_path / "model.onnx"
     path.write_bytes(b"an older model")
@@ -174,7 +165,7 @@ def test_an_older_file_stays_as_it_was_when_the_exported_network_is_wrong(
     assert [file.read_bytes() for file in tmp_path.iterdir()] == [b"an older model"]
 
 
-def test_what_cannot_be_exported_leaves_nothing(tmp_path: Path, random_outdet: OutDet) -> None:
+def test_what_cannot_be_exported_leaves_nothing(tmp_path, random_outdet) -> None:
     with pytest.raises(InputError, match="outdet: has not been trained"):
         export(OutDet(), tmp_path / "model.onnx")
     with pytest.raises(InputError, match="is not a file that can be replaced"):
@@ -184,7 +175,7 @@ def test_what_cannot_be_exported_leaves_nothing(tmp_path: Path, random_outdet: O
 
 @pytest.mark.usefixtures("few_cases", "one_block")
 def test_numbers_too_small_to_count_are_set_to_0_and_the_proof_holds(
-    tmp_path: Path, random_outdet: OutDet
+    tmp_path, random_outdet
 ) -> None:
     model = deepcopy(random_outdet)
     subnormal, negligible, kept = 1e-40, -9e-21, 2e-20
@@ -207,11 +198,7 @@ def test_numbers_too_small_to_count_are_set_to_0_and_the_proof_holds(
 
 @pytest.mark.parametrize("succeeds", [True, False])
 def test_a_model_is_left_in_its_modes_and_on_its_device(
-    random_outdet: OutDet,
-    onnx_model: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    succeeds: bool,
+    random_outdet, onnx_model, tmp_path, monkeypatch, succeeds
 ) -> None:
     model, device, moved = deepcopy(random_outdet).train(), torch.device("cuda:0"), []
     frozen = next(module for module in model.modules() if isinstance(module, nn.BatchNorm1d))
@@ -246,7 +233,7 @@ def recorded(seed: int) -> Scan:
 
 @pytest.mark.usefixtures("one_block")
 def test_further_channels_are_seen_and_proved_and_missing_ones_are_their_mean(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path, monkeypatch
 ) -> None:
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("recorded", recorded(3))])
     torch.manual_seed(0)

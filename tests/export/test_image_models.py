@@ -20,7 +20,6 @@ from derain.export.onnx_file import export
 from derain.export.proof import FINITE, INT8, THREADS, Proof
 from derain.export.quantisation import CalibrationReader
 from derain.export.runtime import Derainer
-from derain.models.base import DerainingModule
 from derain.scan import Scan
 from derain.sources.frame import Frame, MemoryFrame
 from derain.sources.source import Frames
@@ -33,9 +32,7 @@ pytestmark = pytest.mark.parametrize("image_model", ["salsanext_lite"], indirect
 
 
 @pytest.fixture(scope="module")
-def int8(
-    image_model: DerainingModule, image_onnx: Path, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[Path, Proof]:
+def int8(image_model, image_onnx, tmp_path_factory) -> tuple[Path, Proof]:
     """The network in eight bits, of the graph in float32, and the proof that the export gave."""
     path = tmp_path_factory.mktemp("int8") / "int8.onnx"
     with pytest.MonkeyPatch.context() as patch:
@@ -43,9 +40,7 @@ def int8(
         return path, export(image_model, path, CALIBRATION)
 
 
-def test_the_graph_is_of_one_size_and_holds_nothing_of_the_machine(
-    image_model: DerainingModule, image_onnx: Path
-) -> None:
+def test_the_graph_is_of_one_size_and_holds_nothing_of_the_machine(image_model, image_onnx) -> None:
     proto = onnx.load(image_onnx)
     operators = {node.op_type for node in proto.graph.node}
     # Nothing depends on how many pixels are empty.
@@ -66,9 +61,7 @@ def test_the_graph_is_of_one_size_and_holds_nothing_of_the_machine(
     }
 
 
-def test_convolutions_compute_in_eight_bits_and_the_file_is_smaller(
-    int8: tuple[Path, Proof], image_onnx: Path
-) -> None:
+def test_convolutions_compute_in_eight_bits_and_the_file_is_smaller(int8, image_onnx) -> None:
     proto = onnx.load(int8[0])
     made_by = {name: node.op_type for node in proto.graph.node for name in node.output}
     convolutions = [node for node in proto.graph.node if node.op_type == "Conv"]
@@ -82,9 +75,7 @@ def test_convolutions_compute_in_eight_bits_and_the_file_is_smaller(
     assert stored < 0.5 * before
 
 
-def test_the_proof_is_made_on_the_calibration_scans_and_on_every_hard_case(
-    int8: tuple[Path, Proof],
-) -> None:
+def test_the_proof_is_made_on_the_calibration_scans_and_on_every_hard_case(int8) -> None:
     path, proof = int8
     assert proof.holds
     names = [frame.name for frame in CALIBRATION] + [name for name, _ in hard_cases()]
@@ -102,10 +93,7 @@ def test_the_proof_is_made_on_the_calibration_scans_and_on_every_hard_case(
 
 
 def test_a_model_that_finds_no_rain_any_more_leaves_no_file(
-    image_model: DerainingModule,
-    image_onnx: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    image_model, image_onnx, tmp_path, monkeypatch
 ) -> None:
     def blind(proto: onnx.ModelProto, *_: object) -> onnx.ModelProto:
         """Takes so much from every score of rain that none is left."""
@@ -126,10 +114,7 @@ def test_a_model_that_finds_no_rain_any_more_leaves_no_file(
 
 
 def test_one_calibration_scan_is_held_at_a_time(
-    image_model: DerainingModule,
-    image_onnx: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    image_model, image_onnx, tmp_path, monkeypatch
 ) -> None:
     held: weakref.WeakSet[Scan] = weakref.WeakSet()
     read: list[tuple[str, int]] = []

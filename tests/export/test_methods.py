@@ -2,7 +2,6 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
@@ -24,9 +23,7 @@ BOUNDS = Candidates((Bound("range", most=30.0), Bound("z", least=-1.5)), 0.5)
         (str(KEPT / "outdet.onnx"), {"threshold": 0.25}),
     ],
 )
-def test_a_method_is_made_again_from_what_it_writes(
-    tmp_path: Path, name: str, parameters: dict[str, Any]
-) -> None:
+def test_a_method_is_made_again_from_what_it_writes(tmp_path, name, parameters) -> None:
     written = load_method(name, parameters, 1).as_dict()
     (tmp_path / "same.yaml").write_text(yaml.safe_dump(json.loads(json.dumps(written))))
     same_name, same_parameters = named_method(str(tmp_path / "same.yaml"))
@@ -46,9 +43,7 @@ def test_a_method_is_made_again_from_what_it_writes(
         (str(KEPT / "outdet.onnx"), {"threshold": "high"}, "threshold is high"),
     ],
 )
-def test_a_method_that_cannot_be_made_is_refused(
-    name: str, parameters: dict[str, Any], reason: str
-) -> None:
+def test_a_method_that_cannot_be_made_is_refused(name, parameters, reason) -> None:
     with pytest.raises(InputError) as refusal:
         load_method(name, parameters)
     assert reason in str(refusal.value)
@@ -66,7 +61,7 @@ def test_a_method_that_cannot_be_made_is_refused(
         f"method: dsor\nneighbours: 0x{'f' * 5000}",
     ],
 )
-def test_a_file_that_holds_no_parameters_is_refused(tmp_path: Path, content: str) -> None:
+def test_a_file_that_holds_no_parameters_is_refused(tmp_path, content) -> None:
     path = tmp_path / "best.yaml"
     path.write_text("# 100 trials\nmethod: dsor\nneighbours: 7\nrange_multiplier: 0.0812\n")
     assert read_parameters(path) == ("dsor", {"neighbours": 7, "range_multiplier": 0.0812})

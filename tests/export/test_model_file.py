@@ -1,7 +1,6 @@
 """A model file is opened as it was exported and proved, or not at all."""
 
 import json
-from collections.abc import Callable
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -41,12 +40,12 @@ DESCRIPTORS = {
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
+def path(tmp_path) -> Path:
     return tmp_path / "model.onnx"
 
 
 @pytest.fixture
-def exported(path: Path) -> bytes:
+def exported(path) -> bytes:
     """The kept model as it is exported today: with a checksum, and with all of a Spec."""
     file = ModelFile.read(KEPT)
     metadata = file.metadata | {"spec": file.spec.as_dict(), "flushed": 0}
@@ -54,7 +53,7 @@ def exported(path: Path) -> bytes:
     return path.read_bytes()
 
 
-def test_a_flipped_bit_is_refused_or_changes_no_answer(exported: bytes, path: Path) -> None:
+def test_a_flipped_bit_is_refused_or_changes_no_answer(exported, path) -> None:
     points = scene(50)
     answer = Derainer(path, threads=1).probability(points)
     rng = np.random.default_rng(0)
@@ -85,9 +84,7 @@ def test_a_flipped_bit_is_refused_or_changes_no_answer(exported: bytes, path: Pa
 @pytest.mark.parametrize(
     "part", ["a weight", "the threshold", "the checksum", "no text", "a byte more"]
 )
-def test_a_file_that_is_not_as_it_was_exported_says_so(
-    exported: bytes, path: Path, part: str
-) -> None:
+def test_a_file_that_is_not_as_it_was_exported_says_so(exported, path, part) -> None:
     weights = max(onnx.load(KEPT).graph.initializer, key=lambda tensor: len(tensor.raw_data))
     changed = {
         "a weight": exported.replace(weights.raw_data[:64], weights.raw_data[1:65]),
@@ -117,9 +114,7 @@ def without(metadata: dict[str, Any], *keys: str) -> dict[str, Any]:
     ],
     ids=["removed", "earlier", "the spec", "a part", "another part"],
 )
-def test_a_file_that_has_lost_its_checksum_is_refused(
-    exported: bytes, path: Path, change: Callable[[dict[str, Any]], dict[str, Any]]
-) -> None:
+def test_a_file_that_has_lost_its_checksum_is_refused(exported, path, change) -> None:
     proto = onnx.load_from_string(exported)
     metadata = json.dumps(change(ModelFile.read(path).metadata))
     helper.set_model_props(proto, {METADATA_KEY: metadata})
@@ -142,7 +137,7 @@ def holds_tensors(message: Any, seen: frozenset[str] = frozenset()) -> bool:
 
 
 @pytest.mark.parametrize("kind", DESCRIPTORS)
-def test_the_table_of_parts_names_every_place_that_a_tensor_can_have(kind: str) -> None:
+def test_the_table_of_parts_names_every_place_that_a_tensor_can_have(kind) -> None:
     kinds = {proto.DESCRIPTOR.full_name: kind for kind, proto in DESCRIPTORS.items()}
     holding = {
         field.number: kinds[field.message_type.full_name]
@@ -173,7 +168,7 @@ def in_a_branch(proto: onnx.ModelProto, tensor: TensorProto) -> None:
 
 @pytest.mark.parametrize("put", [in_an_initializer, in_a_branch])
 def test_weights_in_another_file_are_refused_and_not_looked_for(
-    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, put: Callable[..., None]
+    path, tmp_path, monkeypatch, put
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "secret").write_bytes(bytes(8))
@@ -211,7 +206,7 @@ def varint(number: int) -> bytes:
     ],
     ids=["bytes", "brackets", "nested", "long", "empty", "short", "nan"],
 )
-def test_metadata_that_cannot_be_read_are_one_line(path: Path, text: bytes, reason: str) -> None:
+def test_metadata_that_cannot_be_read_are_one_line(path, text, reason) -> None:
     path.write_bytes(with_text(json.dumps({"spec": SPEC}).encode()))
     assert ModelFile.read(path).spec.network == "outdet"
     path.write_bytes(with_text(text))
@@ -221,9 +216,7 @@ def test_metadata_that_cannot_be_read_are_one_line(path: Path, text: bytes, reas
     assert len(str(refusal.value)) < 1500
 
 
-def test_scores_that_are_not_a_finite_pair_for_each_cell_are_an_error(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_scores_that_are_not_a_finite_pair_for_each_cell_are_an_error(monkeypatch) -> None:
     derainer = Derainer(KEPT)
     assert derainer.probability(scene(50)).shape == (50,)
     for scores in (np.zeros((3, 2)), *(np.full((50, 2), bad) for bad in (np.nan, -np.inf))):
@@ -232,14 +225,14 @@ def test_scores_that_are_not_a_finite_pair_for_each_cell_are_an_error(
             derainer.probability(scene(50))
 
 
-def test_a_file_of_any_size_is_not_read_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_of_any_size_is_not_read_whole(monkeypatch) -> None:
     monkeypatch.setattr(model_file, "LARGEST_MODEL", KEPT.stat().st_size - 1)
     with pytest.raises(InputError, match=r"outdet\.onnx: not an ONNX model \(more than 35,000"):
         Derainer(KEPT)
 
 
 @pytest.mark.parametrize("archive", [True, False], ids=["archive", "pickle"])
-def test_weights_of_pytorch_lead_to_their_import(tmp_path: Path, archive: bool) -> None:
+def test_weights_of_pytorch_lead_to_their_import(tmp_path, archive) -> None:
     weights = tmp_path / "weights.pt"
     torch.save({"weight": torch.zeros(3)}, weights, _use_new_zipfile_serialization=archive)
     with pytest.raises(InputError, match=r"weights\.pt: .*`derain import-weights`"):

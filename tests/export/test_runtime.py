@@ -7,10 +7,9 @@ is what that model answered for ``scene(300)``. None of the three is ever to be 
 """
 
 import pickle
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -25,7 +24,6 @@ from derain.export.runtime import Derainer
 from derain.filters import DROR
 from derain.models.base import DerainingModule
 from derain.models.checkpoint import load_model
-from derain.models.outdet import OutDet
 from derain.scan import Scan
 from derain.sources.frame import MemoryFrame
 from derain.sources.judgement import Judgement
@@ -38,11 +36,9 @@ from derain.views.window import Window, WindowOfScans
 KEPT = Path(__file__).parent / "kept"
 POINTS = 200
 
-Points = NDArray[np.float32]
-
 
 @pytest.fixture(scope="module")
-def derainer(onnx_model: Path) -> Derainer:
+def derainer(onnx_model) -> Derainer:
     return Derainer(onnx_model, threads=1)
 
 
@@ -53,7 +49,7 @@ def from_pytorch(model: DerainingModule, scan: Scan) -> NDArray[np.float32]:
         return view.back(probability_of_rain(model(**inputs).numpy()))
 
 
-def test_the_answers_are_those_of_pytorch(derainer: Derainer, random_outdet: OutDet) -> None:
+def test_the_answers_are_those_of_pytorch(derainer, random_outdet) -> None:
     assert 0.4 < derainer(scene()).mean() < 0.6  # what the tests compare is worth comparing
     for name, scan in hard_cases(largest=3000):
         probability = derainer.probability(scan)
@@ -85,7 +81,7 @@ def test_files_of_an_early_derain_answer_as_they_did() -> None:
     ],
     ids=["5 columns", "float64", "Fortran order", "strided", "big-endian", "Scan"],
 )
-def test_points_come_in_any_form(derainer: Derainer, convert: Callable[[Points], Any]) -> None:
+def test_points_come_in_any_form(derainer, convert) -> None:
     points = scene(500)
     np.testing.assert_array_equal(
         derainer.probability(convert(points)), derainer.probability(points)
@@ -93,7 +89,7 @@ def test_points_come_in_any_form(derainer: Derainer, convert: Callable[[Points],
     np.testing.assert_array_equal(points, scene(500))  # which are left as they were
 
 
-def test_points_without_intensity_get_the_mean_of_the_training_data(derainer: Derainer) -> None:
+def test_points_without_intensity_get_the_mean_of_the_training_data(derainer) -> None:
     points = scene(500)
     points[:, 3] = derainer.spec.mean[3]
     expected = derainer.probability(points[:, :3])
@@ -102,7 +98,7 @@ def test_points_without_intensity_get_the_mean_of_the_training_data(derainer: De
     np.testing.assert_array_equal(derainer.probability(points), expected)
 
 
-def test_rows_that_cannot_be_judged_are_not_rain_and_change_no_other(derainer: Derainer) -> None:
+def test_rows_that_cannot_be_judged_are_not_rain_and_change_no_other(derainer) -> None:
     points = scene(500)
     rows = [
         *([np.nan, 1, 1, 1], [1, np.inf, 1, 1], [1, 1, -np.inf, 1], [1, 1, 1, np.nan]),
@@ -117,9 +113,7 @@ def test_rows_that_cannot_be_judged_are_not_rain_and_change_no_other(derainer: D
 
 @settings(max_examples=20)
 @given(seed=st.integers(0, 2**32 - 1))
-def test_neither_order_nor_copies_nor_threads_matter(
-    derainer: Derainer, onnx_model: Path, seed: int
-) -> None:
+def test_neither_order_nor_copies_nor_threads_matter(derainer, onnx_model, seed) -> None:
     points, generator = scene(700), np.random.default_rng(seed)
     answer = derainer.probability(points)
     rows = generator.permutation(np.concatenate([np.arange(700), generator.integers(0, 700, 99)]))
@@ -129,9 +123,7 @@ def test_neither_order_nor_copies_nor_threads_matter(
     np.testing.assert_allclose(of_two.probability(points), answer, atol=1e-6)
 
 
-def test_the_threshold_is_that_of_the_file(
-    derainer: Derainer, saying: Callable[[dict[str, Any]], Path]
-) -> None:
+def test_the_threshold_is_that_of_the_file(derainer, saying) -> None:
     stricter = Derainer(saying({"spec": {**derainer.metadata["spec"], "threshold": 0.75}}))
     np.testing.assert_array_equal(stricter(scene()), stricter.probability(scene()) > 0.75)
     assert 0 < stricter(scene()).sum() < derainer(scene()).sum()
@@ -148,12 +140,12 @@ def test_the_threshold_is_that_of_the_file(
     ],
     ids=["missing", "folder", "filter", "object", "array"],
 )
-def test_what_is_no_model_is_refused(given_: Any, reason: str) -> None:
+def test_what_is_no_model_is_refused(given_, reason) -> None:
     with pytest.raises(InputError, match=reason):
         Derainer(given_)
 
 
-def test_a_derainer_can_be_pickled(onnx_model: Path) -> None:
+def test_a_derainer_can_be_pickled(onnx_model) -> None:
     derainer = Derainer(onnx_model, threads=2)
     derainer.spec, derainer.warns = replace(derainer.spec, threshold=0.9), False
     again = pickle.loads(pickle.dumps(derainer))
@@ -163,7 +155,7 @@ def test_a_derainer_can_be_pickled(onnx_model: Path) -> None:
     assert pickle.loads(pickle.dumps(Derainer())).name == "default"
 
 
-def test_a_frame_is_answered_at_once_as_if_it_were_judged_alone(derainer: Derainer) -> None:
+def test_a_frame_is_answered_at_once_as_if_it_were_judged_alone(derainer) -> None:
     scan, stopwatch = Scan.of(scene(POINTS)), Stopwatch()
     frame = MemoryFrame(key="0", scan=scan)
     judgement = derainer.push(frame, stopwatch)
@@ -187,7 +179,7 @@ def as_seen(scan: Scan, before: int, after: int) -> Scan:
 
 
 @pytest.fixture
-def windowed(onnx_model: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Derainer]:
+def windowed(onnx_model, monkeypatch) -> Iterator[Derainer]:
     """A model whose view asks for two scans before and one after."""
 
     def of_window(view: NeighbourView, scans: WindowOfScans) -> object:
@@ -206,7 +198,7 @@ def assert_seen(judgement: Judgement | None, derainer: Derainer, before: int, af
     assert (judgement.probability != other).any()
 
 
-def test_a_window_is_answered_when_it_is_whole_and_at_the_end(windowed: Derainer) -> None:
+def test_a_window_is_answered_when_it_is_whole_and_at_the_end(windowed) -> None:
     frames = [*Frames.of_scans([Scan.of(scene(POINTS, seed)) for seed in range(4)])]
     answers = [windowed.push(frame) for frame in frames]
     assert [answer and answer.frame for answer in answers] == [None, *frames[:3]]
@@ -219,7 +211,7 @@ def test_a_window_is_answered_when_it_is_whole_and_at_the_end(windowed: Derainer
     assert windowed.waiting == 0
 
 
-def test_points_without_a_frame_are_one_sequence_until_its_end(windowed: Derainer) -> None:
+def test_points_without_a_frame_are_one_sequence_until_its_end(windowed) -> None:
     assert windowed.push(scene(POINTS, 0)) is None
     assert_seen(windowed.push(Scan.of(scene(POINTS, 1))), windowed, before=0, after=1)
     (frame,) = Frames.of_scans([Scan.of(scene(POINTS))], "another")
@@ -232,9 +224,7 @@ def test_points_without_a_frame_are_one_sequence_until_its_end(windowed: Deraine
         assert_seen(answer, windowed, before=0, after=0)
 
 
-def test_one_of_those_that_wait_does_not_take_the_others_with_it(
-    windowed: Derainer, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_one_of_those_that_wait_does_not_take_the_others_with_it(windowed, monkeypatch) -> None:
     monkeypatch.setattr(NeighbourView, "window", Window(before=0, after=3))
     derainer = Derainer(windowed.path, 1)
     for seed in range(3):

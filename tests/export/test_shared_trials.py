@@ -53,7 +53,7 @@ def alone(most: int) -> list[dict[str, Any]]:
     # Which of three searches begins or ends a trial next; 3 to 5 kill one and start another.
     schedule=st.lists(st.integers(0, 5), max_size=60)
 )
-def test_every_trial_is_computed_and_all_searches_find_the_same(schedule: list[int]) -> None:
+def test_every_trial_is_computed_and_all_searches_find_the_same(schedule) -> None:
     storage, most = InMemoryStorage(), 16
     searches = [join(storage) for _ in range(3)]
     at_work: dict[int, FrozenTrial] = {}
@@ -82,7 +82,7 @@ def test_every_trial_is_computed_and_all_searches_find_the_same(schedule: list[i
 
 
 @pytest.mark.parametrize("killed_at", [0, 3, 13])
-def test_a_search_that_was_killed_goes_on_as_one_that_was_not(killed_at: int) -> None:
+def test_a_search_that_was_killed_goes_on_as_one_that_was_not(killed_at) -> None:
     storage = InMemoryStorage()
     run(join(storage), killed_at)
     assert join(storage).next(18) is not None  # and is killed

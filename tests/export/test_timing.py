@@ -1,7 +1,5 @@
 """Timed runs: which scans are read, how often and in what order; and the report of them."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -32,7 +30,7 @@ class Recorder:
         stopwatch.milliseconds["network"] = len(self.points)
 
 
-def test_scans_take_turns_after_the_first_has_warmed_up(tmp_path: Path) -> None:
+def test_scans_take_turns_after_the_first_has_warmed_up(tmp_path) -> None:
     scans = [tmp_path / f"{points}.bin" for points in (30, 40)]
     for path in scans:
         scene(int(path.stem)).tofile(path)
@@ -55,9 +53,7 @@ def test_percentiles_are_of_one_stage_or_of_each_run_as_a_whole() -> None:
     assert np.isnan(RunTimes.of_no_runs().percentile(50))
 
 
-def test_a_model_is_timed_on_a_file_or_on_a_made_up_scan(
-    onnx_model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_model_is_timed_on_a_file_or_on_a_made_up_scan(onnx_model, tmp_path, monkeypatch) -> None:
     wide = np.column_stack([scene(400), np.zeros(400, np.float32)])
     wide.tofile(tmp_path / "wide.bin")
     stated = ["x", "y", "z", "intensity", "ring"]

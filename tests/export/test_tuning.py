@@ -71,9 +71,7 @@ def tune(
 
 
 @pytest.mark.parametrize("name", FILTERS)
-def test_tuning_starts_from_the_defaults_and_ends_no_worse(
-    name: str, seen: list[LabelledNeighbourhoods]
-) -> None:
+def test_tuning_starts_from_the_defaults_and_ends_no_worse(name, seen) -> None:
     assert search_space(name)
     assert neighbours_to_find(name) == 12
     tuned, computed = tune(name, seen, 4)
@@ -96,9 +94,7 @@ class Near(PointFilter):
         return view.distances[:, self.neighbours - 1] < self.reach
 
 
-def test_as_many_neighbours_are_found_as_any_trial_looks_at(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_as_many_neighbours_are_found_as_any_trial_looks_at(monkeypatch) -> None:
     monkeypatch.setattr(FILTERS, "_members", dict(FILTERS))
 
     def add(**space: Span) -> None:
@@ -130,9 +126,7 @@ def test_tuning_finds_the_radius_that_parts_drops_from_a_wall() -> None:
     assert 0.1 < tuned.parameters["radius"] < 3
 
 
-def test_a_stored_study_goes_on_with_the_same_scans_and_labels_alone(
-    seen: list[LabelledNeighbourhoods], tmp_path: Path
-) -> None:
+def test_a_stored_study_goes_on_with_the_same_scans_and_labels_alone(seen, tmp_path) -> None:
     storage = tmp_path / "study.db"
     for trials, run in ((4, 4), (7, 3), (7, 0)):
         tuned, computed = tune("dsor", seen, trials, storage)
@@ -159,9 +153,7 @@ judged = st.integers(1, 30).flatmap(
 
 
 @given(st.lists(judged, min_size=1, max_size=3).filter(lambda s: any(r.any() for _, r in s)))
-def test_the_best_threshold_is_that_of_trying_all(
-    scans: list[tuple[np.ndarray, np.ndarray]],
-) -> None:
+def test_the_best_threshold_is_that_of_trying_all(scans) -> None:
     probability = np.concatenate([p for p, _ in scans])
     rain = np.concatenate([r for _, r in scans])
 

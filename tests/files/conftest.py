@@ -29,7 +29,7 @@ def columns() -> Columns:
 
 
 @pytest.fixture
-def scan(columns: Columns) -> Scan:
+def scan(columns) -> Scan:
     """The scan of those columns."""
     xyz = np.stack([columns[axis] for axis in "xyz"], axis=1)
     return Scan(xyz, columns["intensity"].astype(np.float32), fields=columns)

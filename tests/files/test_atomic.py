@@ -32,7 +32,7 @@ def write_half(path: Path, error: BaseException) -> None:
         raise error
 
 
-def test_the_file_appears_when_the_block_ends_in_a_folder_that_is_made(tmp_path: Path) -> None:
+def test_the_file_appears_when_the_block_ends_in_a_folder_that_is_made(tmp_path) -> None:
     path = tmp_path / "a" / "b" / "scan.bin"
     with replacing(path) as temporary:
         temporary.write_bytes(b"new")
@@ -53,9 +53,7 @@ FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         (FULL, InputError),
     ],
 )
-def test_a_writer_that_fails_leaves_the_old_file_and_no_temporary(
-    tmp_path: Path, error: BaseException, raised: type[BaseException]
-) -> None:
+def test_a_writer_that_fails_leaves_the_old_file_and_no_temporary(tmp_path, error, raised) -> None:
     path = tmp_path / "scan.bin"
     path.write_bytes(b"old")
     with pytest.raises(raised):
@@ -65,9 +63,7 @@ def test_a_writer_that_fails_leaves_the_old_file_and_no_temporary(
 
 
 @pytest.mark.parametrize("mode", [None, 0o600, 0o755])
-def test_a_file_has_the_permissions_of_the_one_before_it_or_of_any_new_one(
-    tmp_path: Path, mode: int | None
-) -> None:
+def test_a_file_has_the_permissions_of_the_one_before_it_or_of_any_new_one(tmp_path, mode) -> None:
     path, plain = tmp_path / "scan", tmp_path / "plain"
     plain.touch()
     if mode is not None:
@@ -79,7 +75,7 @@ def test_a_file_has_the_permissions_of_the_one_before_it_or_of_any_new_one(
 
 
 @pytest.mark.parametrize("dangling", [False, True])
-def test_a_link_leads_to_the_new_file(tmp_path: Path, dangling: bool) -> None:
+def test_a_link_leads_to_the_new_file(tmp_path, dangling) -> None:
     target, link = tmp_path / "elsewhere/scan.bin", tmp_path / "scan.bin"
     target.parent.mkdir()
     if not dangling:
@@ -91,7 +87,7 @@ def test_a_link_leads_to_the_new_file(tmp_path: Path, dangling: bool) -> None:
     assert list(target.parent.iterdir()) == [target]
 
 
-def test_what_cannot_be_written_is_an_error(tmp_path: Path) -> None:
+def test_what_cannot_be_written_is_an_error(tmp_path) -> None:
     (tmp_path / "file").touch()
     for path in (tmp_path, Path(), Path("/"), Path(os.devnull)):
         with pytest.raises(InputError, match="is not a file that can be replaced"):
@@ -101,7 +97,7 @@ def test_what_cannot_be_written_is_an_error(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_a_folder_without_permission_is_an_error(tmp_path: Path) -> None:
+def test_a_folder_without_permission_is_an_error(tmp_path) -> None:
     tmp_path.chmod(0o500)
     with pytest.raises(InputError, match=r"cannot be written \(Permission denied\)"):
         write(tmp_path / "scan.bin")
@@ -109,7 +105,7 @@ def test_a_folder_without_permission_is_an_error(tmp_path: Path) -> None:
         require_writable_folder(tmp_path / "out/below")
 
 
-def test_a_folder_to_be_made_is_looked_at_and_not_made(tmp_path: Path) -> None:
+def test_a_folder_to_be_made_is_looked_at_and_not_made(tmp_path) -> None:
     require_writable_folder(tmp_path / "out/below")
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match=r"file/below: cannot be written"):
@@ -119,7 +115,7 @@ def test_a_folder_to_be_made_is_looked_at_and_not_made(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("function", [(os, "open"), (atomic, "lock")], ids=["open", "lock"])
 def test_a_folder_that_was_taken_for_abandoned_is_made_anew(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, function: tuple[Any, str]
+    tmp_path, monkeypatch, function
 ) -> None:
     called, taken = getattr(*function), list[Path]()
 
@@ -141,7 +137,7 @@ def test_a_folder_that_was_taken_for_abandoned_is_made_anew(
 
 @pytest.mark.parametrize("locks", [True, False])
 def test_what_a_killed_process_left_goes_where_it_can_be_told_from_what_is_in_use(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, locks: bool
+    tmp_path, monkeypatch, locks
 ) -> None:
     (tmp_path / f"{atomic.PREFIX}0.bin").touch()  # as earlier versions left them
     (tmp_path / f"{atomic.PREFIX}1").mkdir()

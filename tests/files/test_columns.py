@@ -21,7 +21,7 @@ def test_a_column_of_the_same_name_is_replaced_in_its_place() -> None:
     np.testing.assert_array_equal(scan.fields["ring"], np.arange(10))
 
 
-def test_of_names_in_two_cases_the_lower_one_counts(tmp_path: Path) -> None:
+def test_of_names_in_two_cases_the_lower_one_counts(tmp_path) -> None:
     names = ("X", "y", "z", "x", "i", "Intensity", "intensity")
     scan = read_scan(written(tmp_path / "scan.csv", names))
     assert scan.xyz[0].tolist() == [4, 2, 3]
@@ -31,9 +31,7 @@ def test_of_names_in_two_cases_the_lower_one_counts(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "names", [("x", "y", "z", "Intensity", "INTENSITY"), ("x", "y", "z", "Radar", "RADAR")]
 )
-def test_two_columns_that_differ_in_case_alone_are_refused(
-    tmp_path: Path, names: tuple[str, ...]
-) -> None:
+def test_two_columns_that_differ_in_case_alone_are_refused(tmp_path, names) -> None:
     path = written(tmp_path / "scan.csv", names)
     with pytest.raises(InputError, match=f"{names[3]} and {names[4]}") as refused:
         read_scan(path)
@@ -55,7 +53,7 @@ def test_two_columns_that_differ_in_case_alone_are_refused(
     ],
 )
 def test_a_column_that_a_format_cannot_hold_is_refused(
-    tmp_path: Path, scan: Scan, suffix: str, name: str, column: np.ndarray
+    tmp_path, scan, suffix, name, column
 ) -> None:
     path = tmp_path / f"scan{suffix}"
     with pytest.raises(InputError, match=rf"\{suffix} has no place for the column '"):
@@ -64,7 +62,7 @@ def test_a_column_that_a_format_cannot_hold_is_refused(
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".ply", ".pcd", ".npz", ".feather"])
-def test_a_file_without_coordinates_is_refused(tmp_path: Path, suffix: str) -> None:
+def test_a_file_without_coordinates_is_refused(tmp_path, suffix) -> None:
     path = written(tmp_path / f"scan{suffix}", ("x", "y", "depth", "ring"))
     with pytest.raises(InputError, match=r"no coordinates|no x, y and z .* \(x, y, depth, ring\)"):
         read_scan(path)

@@ -112,7 +112,7 @@ READABLE = {".bin 0", ".bin 1", ".bin 2", ".ply 2"}
 
 
 @pytest.mark.parametrize("name", HOSTILE | OF_THE_FUZZER)
-def test_small_files_cannot_take_much_memory(tmp_path: Path, name: str) -> None:
+def test_small_files_cannot_take_much_memory(tmp_path, name) -> None:
     suffix, content, reason = (HOSTILE | OF_THE_FUZZER)[name]
     path = tmp_path / f"scan{suffix}"
     path.write_bytes(content())
@@ -128,7 +128,7 @@ def test_small_files_cannot_take_much_memory(tmp_path: Path, name: str) -> None:
         tracemalloc.stop()
 
 
-def test_what_compresses_as_well_as_real_scans_and_better_is_read(tmp_path: Path) -> None:
+def test_what_compresses_as_well_as_real_scans_and_better_is_read(tmp_path) -> None:
     points = scene(20_000)
     points[1000:, 3] = 0
     scan = Scan(points[:, :3].copy(), points[:, 3].copy())
@@ -141,7 +141,7 @@ def test_what_compresses_as_well_as_real_scans_and_better_is_read(tmp_path: Path
     assert len(read_scan(tmp_path / "empty.npz")) == 128 * 2048
 
 
-def test_a_file_larger_than_any_scan_is_not_read(tmp_path: Path) -> None:
+def test_a_file_larger_than_any_scan_is_not_read(tmp_path) -> None:
     path = tmp_path / "scan.bin"
     path.touch()
     os.truncate(path, LARGEST_SCAN + 16)
@@ -150,7 +150,7 @@ def test_a_file_larger_than_any_scan_is_not_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".bin", ".csv", ".npz.gz", ".label"])
-def test_pipes_devices_and_folders_are_not_opened(tmp_path: Path, suffix: str) -> None:
+def test_pipes_devices_and_folders_are_not_opened(tmp_path, suffix) -> None:
     pipe, device, folder = (tmp_path / f"{kind}{suffix}" for kind in ("pipe", "device", "folder"))
     os.mkfifo(pipe)
     device.symlink_to("/dev/zero")
@@ -169,7 +169,7 @@ def test_pipes_devices_and_folders_are_not_opened(tmp_path: Path, suffix: str) -
     ],
 )
 def test_what_goes_wrong_while_a_file_is_read_is_its_fault_but_for_a_broken_pipe(
-    error: Exception, reason: str
+    error, reason
 ) -> None:
     kind = BrokenPipeError if isinstance(error, BrokenPipeError) else InputError
     with pytest.raises(kind, match=reason), reading(Path("scan.bin")):

@@ -1,7 +1,5 @@
 """Small documents are read within bounds, and say what is wrong with them."""
 
-from pathlib import Path
-
 import pytest
 
 from derain.errors import LONGEST_REASON, InputError
@@ -26,7 +24,7 @@ BAD_YAML = {
 
 
 @pytest.mark.parametrize("name", BAD_YAML)
-def test_bad_yaml_is_one_short_line(name: str, tmp_path: Path) -> None:
+def test_bad_yaml_is_one_short_line(name, tmp_path) -> None:
     path = tmp_path / "document.yaml"
     path.write_bytes(BAD_YAML[name].encode("latin-1"))
     with pytest.raises(InputError) as caught:
@@ -40,16 +38,14 @@ def test_bad_yaml_is_one_short_line(name: str, tmp_path: Path) -> None:
     ("text", "line", "key"),
     [("b:\n  - c: 1\n    'a': 1\n    a: 1\n", 4, "a"), ("5: x\n0x5: y\n", 2, "5")],
 )
-def test_a_key_that_is_there_twice_is_named_with_its_line(
-    tmp_path: Path, text: str, line: int, key: str
-) -> None:
+def test_a_key_that_is_there_twice_is_named_with_its_line(tmp_path, text, line, key) -> None:
     path = tmp_path / "document.yaml"
     path.write_text(text)
     with pytest.raises(InputError, match=rf"line {line}: the key '?{key}'? is there twice"):
         Entry.of_yaml(path)
 
 
-def test_a_document_that_is_too_large_is_not_read(tmp_path: Path) -> None:
+def test_a_document_that_is_too_large_is_not_read(tmp_path) -> None:
     path = tmp_path / "document.yaml"
     path.write_text("a: 1\n" + "#" * LARGEST_DOCUMENT)
     with pytest.raises(InputError, match="more than 1,048,576"):
@@ -59,7 +55,7 @@ def test_a_document_that_is_too_large_is_not_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["", "[" * 100_000, "[" * 40 + "]" * 40, "9" * 5000])
-def test_bad_json_is_refused(text: str) -> None:
+def test_bad_json_is_refused(text) -> None:
     with pytest.raises(InputError, match="metadata: not JSON"):
         Entry.of_json(text, "metadata")
 
@@ -67,7 +63,7 @@ def test_bad_json_is_refused(text: str) -> None:
 @pytest.mark.parametrize(
     "value", [10**400, -(10**400), float("nan"), float("inf"), True, "1", None, [1], {"a": 1}]
 )
-def test_a_number_is_finite_and_no_truth_value(value: object) -> None:
+def test_a_number_is_finite_and_no_truth_value(value) -> None:
     entry = Entry("file", "a.b", value)
     with pytest.raises(InputError, match=r"file: a\.b: "):
         entry.number()
@@ -78,7 +74,7 @@ def test_a_number_is_finite_and_no_truth_value(value: object) -> None:
         entry.scalar()
 
 
-def test_many_small_values_in_a_document_are_too_many(tmp_path: Path) -> None:
+def test_many_small_values_in_a_document_are_too_many(tmp_path) -> None:
     path = tmp_path / "document"
     path.write_text("[" + "[]," * 100_000 + "0]")  # 300 kB, and 10 MB in memory
     for read in (Entry.of_yaml, Entry.of_json_file):
@@ -95,9 +91,7 @@ def test_many_small_values_in_a_document_are_too_many(tmp_path: Path) -> None:
         *((text, text.strip("'")) for text in ("'4e-6'", "4e-6 m", "e5", "0e1f")),
     ],
 )
-def test_a_number_with_an_exponent_is_one_with_and_without_a_point(
-    text: str, value: object, tmp_path: Path
-) -> None:
+def test_a_number_with_an_exponent_is_one_with_and_without_a_point(text, value, tmp_path) -> None:
     path = tmp_path / "document.yaml"
     path.write_text(f"a: {text}")
     read = Entry.of_yaml(path).value["a"]
@@ -121,7 +115,7 @@ def test_values_are_cut_in_messages() -> None:
     assert shown(16**10_000) == "a number of many digits"
 
 
-def test_a_name_or_a_path_is_a_file_and_anything_else_is_refused(tmp_path: Path) -> None:
+def test_a_name_or_a_path_is_a_file_and_anything_else_is_refused(tmp_path) -> None:
     (own := tmp_path / "mine.yaml").touch()
     files = {"one": tmp_path / "one.yaml", "two": own}
     assert packaged_or_own("two", files, "sensor") == own

@@ -1,7 +1,6 @@
 """Where a sensor is: against SciPy's rotations, and what no sensor's place can be."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,7 +20,7 @@ POINTS = np.random.default_rng(0).uniform(-100, 100, (20, 3)).astype(np.float32)
 
 
 @given(poses)
-def test_a_pose_turns_about_fixed_axes_and_then_moves(pose: tuple[float, ...]) -> None:
+def test_a_pose_turns_about_fixed_axes_and_then_moves(pose) -> None:
     rotation = Rotation.from_euler("xyz", pose[3:], degrees=True)  # lower case: fixed axes
     expected = rotation.apply(POINTS.astype(np.float64)) + pose[:3]
     moved = Extrinsics.of_pose(*pose)(POINTS)
@@ -29,7 +28,7 @@ def test_a_pose_turns_about_fixed_axes_and_then_moves(pose: tuple[float, ...]) -
     np.testing.assert_allclose(moved, expected, atol=1e-5)
 
 
-def test_a_file_holds_a_pose_or_a_matrix(tmp_path: Path) -> None:
+def test_a_file_holds_a_pose_or_a_matrix(tmp_path) -> None:
     pose = dict(zip(POSE, (0.5, -0.2, -0.7, 1, -2, 30), strict=True))
     (tmp_path / "pose.yaml").write_text(yaml.safe_dump(pose))
     read = read_extrinsics(tmp_path / "pose.yaml")
@@ -69,9 +68,7 @@ def rigid(**changes: float) -> list[list[float]]:
         (yaml.safe_dump({"matrix": rigid(), "x": 1}), "its keys are matrix, x"),
     ],
 )
-def test_what_is_no_rigid_motion_is_refused_in_one_line(
-    tmp_path: Path, content: str, reason: str
-) -> None:
+def test_what_is_no_rigid_motion_is_refused_in_one_line(tmp_path, content, reason) -> None:
     path = tmp_path / "radar.yaml"
     path.write_text(content)
     with pytest.raises(InputError, match=rf"radar\.yaml: .*{re.escape(reason)}") as refusal:

@@ -2,7 +2,6 @@
 
 import gzip
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -32,14 +31,7 @@ RADAR = (
         ("radar/ars548_detections.npy", 308, None, 10),
     ],
 )
-def test_real_scans_come_back_bit_for_bit(
-    tmp_path: Path,
-    shared: Path,
-    name: str,
-    points: int,
-    shape: tuple[int, int] | None,
-    columns: int,
-) -> None:
+def test_real_scans_come_back_bit_for_bit(tmp_path, shared, name, points, shape, columns) -> None:
     source = shared / "data" / name
     stated = RADAR if source.suffix == ".npy" else DEFAULT_COLUMNS
     scan = read_scan(source, stated)
@@ -55,14 +47,14 @@ def test_real_scans_come_back_bit_for_bit(
 
 
 @pytest.mark.parametrize("name", ["intensity", "Intensity", "i", "remission", "rcs"])
-def test_intensity_is_found_under_its_many_names(tmp_path: Path, name: str) -> None:
+def test_intensity_is_found_under_its_many_names(tmp_path, name) -> None:
     np.save(tmp_path / "scan.npy", np.arange(8.0).reshape(2, 4))
     scan = read_scan(tmp_path / "scan.npy", ("X", "Y", "Z", name))
     assert (scan.intensity is not None) == (name != "rcs")
     assert list(scan.fields) == ["X", "Y", "Z", name]
 
 
-def test_names_in_upper_case_and_names_as_text_are_understood(tmp_path: Path) -> None:
+def test_names_in_upper_case_and_names_as_text_are_understood(tmp_path) -> None:
     path = str(tmp_path / "scan.Pcd")
     with pytest.raises(InputError, match="there is no such file"):
         read_scan(path)
@@ -72,16 +64,14 @@ def test_names_in_upper_case_and_names_as_text_are_understood(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("use", [read_scan, lambda path: write_scan(path, Scan(np.zeros((1, 3))))])
-def test_an_unknown_suffix_is_refused_with_the_known_ones(
-    tmp_path: Path, use: Callable[[Path], object]
-) -> None:
+def test_an_unknown_suffix_is_refused_with_the_known_ones(tmp_path, use) -> None:
     known = r"Available: \.asc, \.bin, \.csv, .*\.ply, \.txt, \.xyz, and each of them with \.gz\."
     for name in ("scan.e57", "scan", "scan.e57.gz", "scan.gz"):
         with pytest.raises(InputError, match=known):
             use(tmp_path / name)
 
 
-def test_tables_are_scans_where_there_are_no_others(tmp_path: Path) -> None:
+def test_tables_are_scans_where_there_are_no_others(tmp_path) -> None:
     for name in ("1.txt", "metadata.csv", "times.txt"):
         (tmp_path / name).touch()
     assert [path.name for path in find_scans([tmp_path])] == ["1.txt"]
@@ -91,7 +81,7 @@ def test_tables_are_scans_where_there_are_no_others(tmp_path: Path) -> None:
     assert [path.name for path in find_scans([tmp_path])] == ["2.xyz"]
 
 
-def test_scans_of_every_format_are_found_compressed_or_not(tmp_path: Path) -> None:
+def test_scans_of_every_format_are_found_compressed_or_not(tmp_path) -> None:
     names = {f"scan{suffix}{compressed}" for suffix in FORMATS for compressed in ("", ".gz")}
     for name in (*names, "scan.label.gz", "scan.gz", "scan.e57.gz"):
         (tmp_path / name).touch()
@@ -99,7 +89,7 @@ def test_scans_of_every_format_are_found_compressed_or_not(tmp_path: Path) -> No
     assert {path.name for path in find_scans([tmp_path])} == names - records
 
 
-def test_folders_stand_for_their_scans_in_order_and_files_for_themselves(tmp_path: Path) -> None:
+def test_folders_stand_for_their_scans_in_order_and_files_for_themselves(tmp_path) -> None:
     folder = tmp_path / "velodyne"
     (folder / "deeper.bin").mkdir(parents=True)
     for name in ("2.bin", "10.pcd", "1.ply", "1.label", "notes.txt", "._1.ply", "3.npz", "0.npy"):
@@ -111,7 +101,7 @@ def test_folders_stand_for_their_scans_in_order_and_files_for_themselves(tmp_pat
     assert found == [single, *(folder / name for name in names), folder / "2.bin"]
 
 
-def test_a_missing_path_and_a_folder_without_scans_are_refused(tmp_path: Path) -> None:
+def test_a_missing_path_and_a_folder_without_scans_are_refused(tmp_path) -> None:
     for name in ("notes.md", "times.txt", "poses.txt", "calib.txt", "timestamps.txt"):
         (tmp_path / name).touch()
     with pytest.raises(InputError, match=r"holds no scans \(\.asc, \.bin"):
@@ -120,7 +110,7 @@ def test_a_missing_path_and_a_folder_without_scans_are_refused(tmp_path: Path) -
         find_scans([tmp_path / "missing"])
 
 
-def test_what_a_written_file_lacks_is_warned_of(tmp_path: Path) -> None:
+def test_what_a_written_file_lacks_is_warned_of(tmp_path) -> None:
     header = PlyHeader("ascii", left_out=("camera", "edge"))
     with pytest.warns(ScanWarning, match="camera, edge"):
         write_scan(tmp_path / "a.ply", Scan(np.ones((2, 3)), header=header))
@@ -135,15 +125,13 @@ def test_what_a_written_file_lacks_is_warned_of(tmp_path: Path) -> None:
         ("scan.gz", "scan", ""),
     ],
 )
-def test_stem_and_suffix_leave_the_compression_out(name: str, stem: str, suffix: str) -> None:
+def test_stem_and_suffix_leave_the_compression_out(name, stem, suffix) -> None:
     path = Path("folder") / name
     assert (scan_stem(path), scan_suffix(path)) == (stem, suffix)
     assert beside(path, ".label") == Path("folder") / f"{stem}.label"
 
 
-def test_a_scan_is_compressed_into_the_same_bytes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_scan_is_compressed_into_the_same_bytes(tmp_path, monkeypatch) -> None:
     plain, first, second = (tmp_path / name for name in ("plain.csv", "1.csv.gz", "2.csv.gz"))
     write_scan(plain, scene(50))
     write_scan(first, scene(50))
@@ -154,7 +142,7 @@ def test_a_scan_is_compressed_into_the_same_bytes(
     np.testing.assert_array_equal(read_scan(first).xyz, scene(50)[:, :3])
 
 
-def test_members_of_a_gzip_follow_one_another_and_damage_is_refused(tmp_path: Path) -> None:
+def test_members_of_a_gzip_follow_one_another_and_damage_is_refused(tmp_path) -> None:
     path = tmp_path / "scan.bin.gz"
     points = scene(20)
     content = gzip.compress(points[:7].tobytes()) + gzip.compress(points[7:].tobytes())

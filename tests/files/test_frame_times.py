@@ -23,15 +23,13 @@ def written(folder: Path, text: str, *names: str) -> list[Path]:
     ],
     ids=["any order", "named by time", "the same line twice", "compressed"],
 )
-def test_a_scan_has_the_time_of_the_line_with_its_name(
-    tmp_path: Path, lines: str, names: tuple[str, ...], times: list[float]
-) -> None:
+def test_a_scan_has_the_time_of_the_line_with_its_name(tmp_path, lines, names, times) -> None:
     scans = written(tmp_path, f"frame,timestamp\n{lines}\n", *names)
     assert read_frame_times(scans).tolist() == times
 
 
 @pytest.mark.parametrize("frame", ["000012.bin", "12", "000012.pcd", " 12"])
-def test_suffix_and_zeros_before_a_name_make_no_difference(tmp_path: Path, frame: str) -> None:
+def test_suffix_and_zeros_before_a_name_make_no_difference(tmp_path, frame) -> None:
     text = f"\ufeffseconds,camera,stem\n5,1,{frame}\n6,1,0\n"
     scans = written(tmp_path, text, "000012.bin", "000000.bin")
     assert read_frame_times(scans, ["stem", "seconds"]).tolist() == [5, 6]
@@ -52,14 +50,14 @@ def test_suffix_and_zeros_before_a_name_make_no_difference(tmp_path: Path, frame
         ("frame,timestamp\n0,1\n000.pcd,2\n", r"gives 000\.pcd two times"),
     ],
 )
-def test_what_does_not_say_when_is_refused(tmp_path: Path, text: str, reason: str) -> None:
+def test_what_does_not_say_when_is_refused(tmp_path, text, reason) -> None:
     scans = written(tmp_path, text, "000000.bin")
     with pytest.raises(InputError, match=rf"metadata\.csv: {reason}") as refusal:
         read_frame_times(scans)
     assert len(str(refusal.value)) < len(str(tmp_path)) + LONGEST_REASON + 200
 
 
-def test_a_missing_or_damaged_file_is_named(tmp_path: Path) -> None:
+def test_a_missing_or_damaged_file_is_named(tmp_path) -> None:
     scans = [tmp_path / "0.bin"]
     with pytest.raises(InputError, match=r"metadata\.csv: there is no such file\. Write one"):
         read_frame_times(scans)

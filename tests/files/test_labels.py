@@ -1,7 +1,6 @@
 """Label files: class in the low half, instance in the high half."""
 
 import os
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from derain import InputError
 from derain.files.labels import instance, read_labels, semantic, write_labels
 
 
-def test_halves_lie_where_semantickitti_puts_them(tmp_path: Path) -> None:
+def test_halves_lie_where_semantickitti_puts_them(tmp_path) -> None:
     path = tmp_path / "scan.label"
     path.write_bytes(bytes([110, 0, 7, 0, 0xFC, 0x00, 0x01, 0x02]))
     raw = read_labels(path, points=2)
@@ -24,7 +23,7 @@ def test_halves_lie_where_semantickitti_puts_them(tmp_path: Path) -> None:
 
 @settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(raw=arrays(np.uint32, st.integers(0, 20)))
-def test_both_halves_come_back(tmp_path: Path, raw: np.ndarray) -> None:
+def test_both_halves_come_back(tmp_path, raw) -> None:
     path = tmp_path / "scan.label"
     write_labels(path, semantic(raw), instance(raw))
     assert path.read_bytes() == raw.astype("<u4").tobytes()
@@ -35,7 +34,7 @@ def test_both_halves_come_back(tmp_path: Path, raw: np.ndarray) -> None:
     ("size", "found"), [(8, "2"), (16, "4"), (13, "3.25"), (0, "0"), (2**42, r"1\.09951e\+12")]
 )
 def test_labels_of_another_length_are_refused_unread_with_both_numbers(
-    tmp_path: Path, size: int, found: str
+    tmp_path, size, found
 ) -> None:
     path = tmp_path / "scan.label"
     path.touch()
@@ -45,7 +44,7 @@ def test_labels_of_another_length_are_refused_unread_with_both_numbers(
 
 
 @pytest.mark.parametrize("label", [-1, 65536])
-def test_an_id_that_needs_more_than_16_bits_is_not_written(tmp_path: Path, label: int) -> None:
+def test_an_id_that_needs_more_than_16_bits_is_not_written(tmp_path, label) -> None:
     ids = np.array([0, label])
     for halves in ((ids, None), (np.zeros(2, np.int64), ids)):
         with pytest.raises(InputError, match="outside 0 to 65535"):

@@ -66,7 +66,7 @@ def check_same(copy: Scan, scan: Scan, *, payload: bool = True) -> None:
 @EXAMPLES
 @pytest.mark.parametrize("encoding", ENCODINGS)
 @given(scan=scans(VALUE_TYPES, counts=((), (2,), (7,))), data=st.data())
-def test_pcd(tmp_path: Path, encoding: str, scan: Scan, data: st.DataObject) -> None:
+def test_pcd(tmp_path, encoding, scan, data) -> None:
     path, payload = tmp_path / "scan.pcd", encoding != "ascii"
     write_scan(path, replace(scan, header=PcdHeader((), 0, 0, 0, encoding)))
     check_same(read_scan(path), scan, payload=payload)
@@ -78,7 +78,7 @@ def test_pcd(tmp_path: Path, encoding: str, scan: Scan, data: st.DataObject) -> 
 @EXAMPLES
 @pytest.mark.parametrize("encoding", BYTE_ORDERS)
 @given(scan=scans(("i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8")))
-def test_ply(tmp_path: Path, encoding: str, scan: Scan) -> None:
+def test_ply(tmp_path, encoding, scan) -> None:
     path = tmp_path / "scan.ply"
     write_scan(path, replace(scan, header=PlyHeader(encoding)))
     check_same(read_scan(path), scan, payload=encoding == "binary_little_endian")
@@ -87,7 +87,7 @@ def test_ply(tmp_path: Path, encoding: str, scan: Scan) -> None:
 @EXAMPLES
 @pytest.mark.parametrize("suffix", [".npz", ".npy"])
 @given(scan=scans((*VALUE_TYPES, "f2"), st.text("abcd_0123456789-.", min_size=2), ((), (2, 3))))
-def test_numpy(tmp_path: Path, suffix: str, scan: Scan) -> None:
+def test_numpy(tmp_path, suffix, scan) -> None:
     path = tmp_path / f"scan{suffix}"
     write_scan(path, scan)
     check_same(read_scan(path, tuple(scan.fields)), scan)
@@ -95,7 +95,7 @@ def test_numpy(tmp_path: Path, suffix: str, scan: Scan) -> None:
 
 @EXAMPLES
 @given(rows=arrays(np.uint32, st.tuples(st.integers(0, 6), st.just(4))))
-def test_bin(tmp_path: Path, rows: np.ndarray) -> None:
+def test_bin(tmp_path, rows) -> None:
     rows[:, 3] &= 0x7FFF_FFFF  # no intensity is negative
     (tmp_path / "scan.bin").write_bytes(rows.astype("<u4").tobytes())
     scan = read_scan(tmp_path / "scan.bin")
@@ -126,7 +126,7 @@ def check_text(path: Path, scan: Scan) -> None:
 @EXAMPLES
 @pytest.mark.parametrize("suffix", [".txt", ".xyz.gz"])
 @given(scan=scans(TEXT_TYPES, st.text("abcd_ä", min_size=2)))
-def test_text(tmp_path: Path, suffix: str, scan: Scan) -> None:
+def test_text(tmp_path, suffix, scan) -> None:
     check_text(tmp_path / f"scan{suffix}", scan)
 
 
@@ -140,13 +140,13 @@ def test_text(tmp_path: Path, suffix: str, scan: Scan) -> None:
         ),
     )
 )
-def test_csv(tmp_path: Path, scan: Scan) -> None:
+def test_csv(tmp_path, scan) -> None:
     check_text(tmp_path / "scan.csv", scan)
 
 
 @EXAMPLES
 @given(scan=scans((*VALUE_TYPES, "f2"), st.text("abä _", min_size=2, max_size=5)), data=st.data())
-def test_feather(tmp_path: Path, scan: Scan, data: st.DataObject) -> None:
+def test_feather(tmp_path, scan, data) -> None:
     path = tmp_path / "scan.feather"
     write_scan(path, scan)
     check_same(read_scan(path), scan)
@@ -156,7 +156,7 @@ def test_feather(tmp_path: Path, scan: Scan, data: st.DataObject) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".npy", ".pcd", ".ply", ".feather", ".las", ".laz"])
-def test_a_file_that_is_cut_off_is_refused(tmp_path: Path, suffix: str) -> None:
+def test_a_file_that_is_cut_off_is_refused(tmp_path, suffix) -> None:
     path = tmp_path / f"scan{suffix}"
     if suffix in (".las", ".laz"):
         write_survey(path, STREET)

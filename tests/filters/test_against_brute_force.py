@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.filters import DROR, DSOR, ROR, SOR, SSR, FilterDerainer, PointFilter, filter_view
-from derain.filters.radius_filters import RadiusFilter, has_few_neighbours
+from derain.filters.radius_filters import has_few_neighbours
 from derain.scan import Scan
 from derain.system.open3d_import import import_open3d
 
@@ -68,9 +68,7 @@ def mean_of_nearest(xyz: NDArray[np.float32], neighbours: int) -> NDArray[np.flo
 
 @settings(max_examples=100)
 @given(gridded, counts, st.sampled_from([0.0, 0.5, 1.0, 2.5, 7.3]))
-def test_ror_counts_the_points_within_its_radius(
-    cloud: NDArray[np.float32], neighbours: int, radius: float
-) -> None:
+def test_ror_counts_the_points_within_its_radius(cloud, neighbours, radius) -> None:
     scan = Scan.of(cloud)
     xyz, _, inverse = positions(scan)
     expected = np.zeros(len(scan), bool)
@@ -96,7 +94,7 @@ def test_a_point_at_exactly_the_radius_is_within() -> None:
     variant=st.sampled_from(["code", "paper"]),
 )
 def test_dror_counts_the_points_within_a_radius_that_grows_with_range(
-    cloud: NDArray[np.float32], neighbours: int, azimuth: float, minimum: float, variant: str
+    cloud, neighbours, azimuth, minimum, variant
 ) -> None:
     scan = Scan.of(cloud)
     xyz, _, _ = positions(scan)
@@ -111,7 +109,7 @@ def test_dror_counts_the_points_within_a_radius_that_grows_with_range(
 @settings(max_examples=80)
 @given(cloud=clouds, neighbours=counts, deviations=st.sampled_from([0.0, 0.01, 1.5]))
 def test_sor_compares_mean_distances_with_their_mean_and_deviation(
-    cloud: NDArray[np.float32], neighbours: int, deviations: float
+    cloud, neighbours, deviations
 ) -> None:
     scan = Scan.of(cloud)
     xyz, _, _ = positions(scan)
@@ -125,9 +123,7 @@ def test_sor_compares_mean_distances_with_their_mean_and_deviation(
 
 @settings(max_examples=80)
 @given(cloud=clouds, neighbours=counts, growth=st.sampled_from([0.05, 0.4]))
-def test_dsor_lets_the_limit_grow_with_range(
-    cloud: NDArray[np.float32], neighbours: int, growth: float
-) -> None:
+def test_dsor_lets_the_limit_grow_with_range(cloud, neighbours, growth) -> None:
     scan = Scan.of(cloud)
     xyz, _, _ = positions(scan)
     if len(xyz) < 2:
@@ -142,7 +138,7 @@ def test_dsor_lets_the_limit_grow_with_range(
 @settings(max_examples=50)
 @given(scattered, counts, st.sampled_from([0.0, 3.0, 40.0]))
 def test_ssr_takes_the_norm_of_the_spectrum_of_a_neighbourhood(
-    cloud: NDArray[np.float32], neighbours: int, threshold: float
+    cloud, neighbours, threshold
 ) -> None:
     scan = Scan.of(np.abs(cloud))  # mirrored into one octant, where copies are rarer
     xyz, first, _ = positions(scan)
@@ -160,9 +156,7 @@ def test_ssr_takes_the_norm_of_the_spectrum_of_a_neighbourhood(
 
 @settings(max_examples=80)
 @given(cloud=clouds, neighbours=counts, spare=st.integers(0, 5))
-def test_one_wide_view_serves_every_filter_as_its_own_does(
-    cloud: NDArray[np.float32], neighbours: int, spare: int
-) -> None:
+def test_one_wide_view_serves_every_filter_as_its_own_does(cloud, neighbours, spare) -> None:
     scan = Scan.of(cloud)
     view = filter_view(neighbours + spare)(scan)
     for filter_ in (
@@ -180,7 +174,7 @@ def test_one_wide_view_serves_every_filter_as_its_own_does(
     "filter_",
     [ROR(3, 0.35), DROR(4, azimuth_resolution=1.0), DROR(azimuth_resolution=2.0, variant="paper")],
 )
-def test_points_settled_along_the_curve_are_settled_right(filter_: RadiusFilter) -> None:
+def test_points_settled_along_the_curve_are_settled_right(filter_) -> None:
     generator = np.random.default_rng(5)
     scan = Scan.of(generator.normal(size=(4000, 3)) * [10, 10, 0.1])
     view = filter_view(filter_.neighbours)(scan)

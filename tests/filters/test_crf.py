@@ -1,7 +1,6 @@
 """The filter of conditional random fields against its formulas, point by point; and its bounds."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -114,7 +113,7 @@ def by_loop(
 @given(
     st.integers(0, 2**32 - 1), st.integers(1, 60), st.integers(1, 8), st.sampled_from([0, 0.3, 2])
 )
-def test_waves_decide_as_a_loop_does(seed: int, points: int, size: int, vote: float) -> None:
+def test_waves_decide_as_a_loop_does(seed, points, size, vote) -> None:
     generator = np.random.default_rng(seed)
     feature = generator.choice([-1.0, -0.4, -0.39, -0.1, 0.05, 0.1, 0.6, 0.7], points)
     rows = np.flatnonzero((feature > -1) | (generator.random(points) < 0.3))
@@ -136,9 +135,7 @@ def test_the_sweep_goes_once_around_from_behind_where_y_is_any_zero() -> None:
 
 @settings(max_examples=100)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.integers(2, 12), st.floats(0.3, 30))
-def test_the_published_variant_does_what_its_formulas_say(
-    seed: int, points: int, neighbours: int, size: float
-) -> None:
+def test_the_published_variant_does_what_its_formulas_say(seed, points, neighbours, size) -> None:
     generator = np.random.default_rng(seed)
     place = generator.normal(size=(points, 3)) * [size, size, 1]
     intensity = generator.choice([0, 0, 1, 1.5, 2, 2.5, 9], points)
@@ -150,7 +147,7 @@ def test_the_published_variant_does_what_its_formulas_say(
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_fitted_variant_does_the_same_within_its_own_bounds(seed: int) -> None:
+def test_the_fitted_variant_does_the_same_within_its_own_bounds(seed) -> None:
     scan = Scan.of(scene(1200, seed))
     ground = find_ground(scan.xyz)
     assert ground is not None
@@ -195,7 +192,7 @@ def test_neither_the_unit_of_intensity_nor_what_is_brighter_matters() -> None:
 
 
 @pytest.mark.parametrize("degrees", [-15, 20])
-def test_a_sensor_may_be_tilted(degrees: float) -> None:
+def test_a_sensor_may_be_tilted(degrees) -> None:
     points = scene(6000)
     turn = Rotation.from_euler("y", degrees, degrees=True)
     points[:, :3] = turn.apply(points[:, :3])
@@ -210,7 +207,7 @@ def test_nothing_is_called_rain_without_rain_or_where_it_is_as_bright_as_all_els
 
 
 @pytest.mark.parametrize("variant", ["fitted", "published"])
-def test_without_intensity_nothing_is_found_and_that_is_said(variant: str) -> None:
+def test_without_intensity_nothing_is_found_and_that_is_said(variant) -> None:
     scan, filter_ = Scan.of(scene()), CRF(variant=variant)
     assert not list(filter_.issues(scan))
     for blind in (replace(scan, intensity=None), replace(scan, intensity=0 * scan.intensity)):
@@ -227,7 +224,7 @@ def test_only_the_published_bound_has_a_unit() -> None:
 
 
 @pytest.mark.parametrize(("variant", "wanted"), [("published", 0.845), ("fitted", 0.84)])
-def test_it_finds_the_snow_of_a_real_scan(shared: Path, variant: str, wanted: float) -> None:
+def test_it_finds_the_snow_of_a_real_scan(shared, variant, wanted) -> None:
     points = np.fromfile(shared / "data/wads/sample.bin", np.float32).reshape(-1, 4)
     label = np.fromfile(shared / "data/wads/sample.label", np.uint32) & 0xFFFF
     assert iou(FilterDerainer(CRF(variant=variant))(points), label == 110) > wanted
@@ -236,5 +233,5 @@ def test_it_finds_the_snow_of_a_real_scan(shared: Path, variant: str, wanted: fl
 @pytest.mark.parametrize(
     "name", ["kitti_hdl64.bin", "kitti_front.bin", "pandaset_pandar64.pcd", "ouster_os1_128.npz"]
 )
-def test_it_leaves_a_dry_recording_alone(shared: Path, name: str) -> None:
+def test_it_leaves_a_dry_recording_alone(shared, name) -> None:
     assert not FilterDerainer(CRF())(read_scan(shared / "data/clean" / name)).any()

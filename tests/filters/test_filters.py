@@ -1,8 +1,6 @@
 """What holds for every filter: hard scans, copies, stages, and parameters that make no sense."""
 
-from collections.abc import Mapping
 from dataclasses import make_dataclass, replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +16,6 @@ from derain.filters import (
     SOR,
     SSR,
     FilterDerainer,
-    PointFilter,
     filter_from,
 )
 from derain.scan import Scan
@@ -33,7 +30,7 @@ every_filter = pytest.mark.parametrize("filter_", MIXED, ids=str)
 
 
 @every_filter
-def test_a_hard_scan_gets_an_answer_for_every_row(filter_: PointFilter) -> None:
+def test_a_hard_scan_gets_an_answer_for_every_row(filter_) -> None:
     few = {f"{points} points": Scan.of(scene()[:points]) for points in (0, 1, 4)}
     with np.errstate(all="raise", under="ignore"):
         for name, scan in {**dict(hard_cases(largest=50)), **few}.items():
@@ -43,9 +40,7 @@ def test_a_hard_scan_gets_an_answer_for_every_row(filter_: PointFilter) -> None:
 
 
 @every_filter
-def test_neither_order_nor_copies_nor_threads_nor_the_way_of_asking_matter(
-    filter_: PointFilter,
-) -> None:
+def test_neither_order_nor_copies_nor_threads_nor_the_way_of_asking_matter(filter_) -> None:
     derainer, points = FilterDerainer(filter_, threads=1), scene()
     rain = derainer(points)
     assert 0.01 < rain.mean() < 0.98
@@ -66,9 +61,7 @@ def test_neither_order_nor_copies_nor_threads_nor_the_way_of_asking_matter(
 
 
 @every_filter
-def test_candidates_are_judged_as_without_bounds_and_nothing_else_is_rain(
-    filter_: PointFilter,
-) -> None:
+def test_candidates_are_judged_as_without_bounds_and_nothing_else_is_rain(filter_) -> None:
     candidates = Candidates((Bound("range", most=15.0), Bound("z", least=-1.0)))
     points = scene()
     # Copies of one position share the verdict of the first, whatever they measured.
@@ -79,7 +72,7 @@ def test_candidates_are_judged_as_without_bounds_and_nothing_else_is_rain(
 
 
 @pytest.mark.parametrize("filter_", [ROR(), DROR(), SOR(), DSOR()], ids=str)
-def test_filters_of_places_do_not_look_at_intensity(filter_: PointFilter) -> None:
+def test_filters_of_places_do_not_look_at_intensity(filter_) -> None:
     derainer, scan = FilterDerainer(filter_), Scan.of(scene())
     np.testing.assert_array_equal(derainer(replace(scan, intensity=None)), derainer(scan))
 
@@ -112,7 +105,7 @@ def test_a_filter_is_found_by_its_name_and_takes_its_parameters() -> None:
 
 
 def test_a_filter_is_called_what_it_is_registered_by_and_its_numbers_are_checked(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch,
 ) -> None:
     monkeypatch.setattr(FILTERS, "_members", dict(FILTERS))
     # Its annotations are texts, as where a module puts them off.
@@ -150,9 +143,7 @@ def test_a_filter_is_called_what_it_is_registered_by_and_its_numbers_are_checked
         ),
     ],
 )
-def test_parameters_that_make_no_sense_are_refused(
-    name: str, parameters: Mapping[str, Any], message: str
-) -> None:
+def test_parameters_that_make_no_sense_are_refused(name, parameters, message) -> None:
     with pytest.raises(InputError) as refusal:
         filter_from(name, parameters)
     assert str(refusal.value).startswith(message)
@@ -163,8 +154,6 @@ def test_parameters_that_make_no_sense_are_refused(
     ("arguments", "message"),
     [(["dror"], r"derain\.DROR\(\)"), ([DROR], r"derain\.DROR\(\)"), ([ROR(), -1], "threads: -1")],
 )
-def test_what_is_no_filter_or_no_number_of_threads_is_refused(
-    arguments: list[Any], message: str
-) -> None:
+def test_what_is_no_filter_or_no_number_of_threads_is_refused(arguments, message) -> None:
     with pytest.raises(InputError, match=message):
         FilterDerainer(*arguments)

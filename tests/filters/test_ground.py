@@ -32,9 +32,7 @@ def clutter(generator: np.random.Generator) -> NDArray[np.float64]:
     ("slope_x", "slope_y"), [(0, 0), (0.03, -0.02), (0.09, 0.04), (-0.2, 0.1), (0.0, 0.4)]
 )
 @pytest.mark.parametrize("offset", [-0.6, -1.8, -3.5])
-def test_the_plane_of_a_road_is_found_whatever_stands_on_it(
-    slope_x: float, slope_y: float, offset: float
-) -> None:
+def test_the_plane_of_a_road_is_found_whatever_stands_on_it(slope_x, slope_y, offset) -> None:
     generator, up = np.random.default_rng(0), np.array([0, 0, 1])
     plane = road(slope_x, slope_y, offset, generator)
     scene = np.concatenate([plane, clutter(generator) + up * (offset + 1.8)])

@@ -1,12 +1,10 @@
 """What the filters reach on the WADS sample, where others have measured the same definitions."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from derain.filters import DROR, DSOR, ROR, SOR, SSR, FilterDerainer, PointFilter
+from derain.filters import DROR, DSOR, ROR, SOR, SSR, FilterDerainer
 from derain.scan import Scan
 
 PUBLISHED = [
@@ -26,7 +24,7 @@ PUBLISHED = [
 
 
 @pytest.fixture(scope="module")
-def snowfall(shared: Path) -> tuple[Scan, NDArray[np.bool_]]:
+def snowfall(shared) -> tuple[Scan, NDArray[np.bool_]]:
     """The scan, and which of its points are falling snow."""
     points = np.fromfile(shared / "data/wads/sample.bin", np.float32).reshape(-1, 4)
     label = np.fromfile(shared / "data/wads/sample.label", np.uint32) & 0xFFFF
@@ -34,9 +32,7 @@ def snowfall(shared: Path) -> tuple[Scan, NDArray[np.bool_]]:
 
 
 @pytest.mark.parametrize(("filter_", "iou"), PUBLISHED, ids=str)
-def test_a_filter_reaches_its_published_quality(
-    snowfall: tuple[Scan, NDArray[np.bool_]], filter_: PointFilter, iou: float
-) -> None:
+def test_a_filter_reaches_its_published_quality(snowfall, filter_, iou) -> None:
     scan, snow = snowfall
     found = FilterDerainer(filter_)(scan)
     assert (found & snow).sum() / (found | snow).sum() == pytest.approx(iou, abs=0.001)

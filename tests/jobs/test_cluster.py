@@ -1,7 +1,6 @@
 """A Dask cluster as an executor, and schedulers that are not there."""
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from jobs.counting import Counting
@@ -23,7 +22,7 @@ def scheduler() -> Iterator[str]:
         yield cluster.scheduler_address
 
 
-def test_its_workers_do_the_units_of_a_job(scheduler: str, tmp_path: Path) -> None:
+def test_its_workers_do_the_units_of_a_job(scheduler, tmp_path) -> None:
     units = [Unit(id=str(number), size=1, inputs="") for number in range(5)]
     task = Task(Job.begin(tmp_path, {"command": "count"}, units), Counting(tmp_path, ("3",)))
     with dask_executor(scheduler) as executor:
@@ -33,7 +32,7 @@ def test_its_workers_do_the_units_of_a_job(scheduler: str, tmp_path: Path) -> No
     assert found[3].error.reason == "is broken"
 
 
-def test_a_unit_whose_worker_dies_is_done_by_another(tmp_path: Path) -> None:
+def test_a_unit_whose_worker_dies_is_done_by_another(tmp_path) -> None:
     units = [Unit(id=str(number), size=1, inputs="") for number in range(4)]
     work = Counting(tmp_path, killing_once=("1",))
     task = Task(Job.begin(tmp_path, {"command": "count"}, units), work)
@@ -47,7 +46,7 @@ def test_a_unit_whose_worker_dies_is_done_by_another(tmp_path: Path) -> None:
     assert len((tmp_path / "1.tries").read_text().splitlines()) == 2
 
 
-def test_a_scheduler_that_is_not_there_is_one_line(tmp_path: Path) -> None:
+def test_a_scheduler_that_is_not_there_is_one_line(tmp_path) -> None:
     (tmp_path / "scheduler.json").write_text("{}")
     for address in ("tcp://127.0.0.1:9", "nowhere", str(tmp_path / "scheduler.json")):
         with pytest.raises(InputError, match="no scheduler answers at"), dask_executor(address):

@@ -26,7 +26,7 @@ EXECUTORS: list[Callable[[], Executor]] = [
 
 
 @pytest.fixture
-def out(tmp_path: Path) -> Path:
+def out(tmp_path) -> Path:
     (tmp_path / "drive").mkdir()
     return tmp_path
 
@@ -46,16 +46,14 @@ def results(
     return [(each.result.content or str(each.result.error), each.before) for each in found]
 
 
-def test_a_second_run_does_nothing_again(out: Path) -> None:
+def test_a_second_run_does_nothing_again(out) -> None:
     assert results(out, Counting(out)) == [(f"{unit.id} done", False) for unit in UNITS]
     assert results(out, Counting(out)) == [(f"{unit.id} done", True) for unit in UNITS]
     assert all(tries(out, unit.id) == 1 for unit in UNITS)
 
 
 @pytest.mark.parametrize("executor", EXECUTORS)
-def test_executors_give_the_same_in_the_same_order(
-    out: Path, executor: Callable[[], Executor]
-) -> None:
+def test_executors_give_the_same_in_the_same_order(out, executor) -> None:
     with executor() as pool:
         found = results(out, Counting(out, failing=("drive/2",)), pool)
     done = [f"{unit.id} done" for unit in UNITS]
@@ -65,7 +63,7 @@ def test_executors_give_the_same_in_the_same_order(
     assert failed.unit == "drive/2"
 
 
-def test_units_that_failed_changed_or_lost_their_files_are_done_again(out: Path) -> None:
+def test_units_that_failed_changed_or_lost_their_files_are_done_again(out) -> None:
     results(out, Counting(out, failing=("drive/0",)))
     (out / "drive" / "1.txt").unlink()
     (out / ".derain" / "units" / "drive" / "2.json").write_text('{"half": ')
@@ -74,7 +72,7 @@ def test_units_that_failed_changed_or_lost_their_files_are_done_again(out: Path)
     assert [tries(out, unit.id) for unit in UNITS] == [2, 2, 2, 2, 1]
 
 
-def test_other_options_are_refused_and_named(out: Path) -> None:
+def test_other_options_are_refused_and_named(out) -> None:
     results(out, Counting(out))
     with pytest.raises(InputError, match="size was 3 and is 4"):
         begun(out, size=4)
@@ -84,13 +82,13 @@ def test_other_options_are_refused_and_named(out: Path) -> None:
     assert next(anew.records_of(UNITS)) == (UNITS[0], None)
 
 
-def test_a_record_of_other_options_does_not_count(out: Path) -> None:
+def test_a_record_of_other_options_does_not_count(out) -> None:
     results(out, Counting(out))
     other = replace(begun(out), options={**OPTIONS, "size": 4})
     assert [record for _, record in other.records_of(UNITS)] == [None] * len(UNITS)
 
 
-def test_a_unit_that_kills_its_process_is_passed_over_after_three_tries(out: Path) -> None:
+def test_a_unit_that_kills_its_process_is_passed_over_after_three_tries(out) -> None:
     with WorkerPool(2) as pool:
         found = results(out, Counting(out, killing=("drive/1",)), pool)
     assert tries(out, "drive/1") == TRIES
@@ -100,27 +98,25 @@ def test_a_unit_that_kills_its_process_is_passed_over_after_three_tries(out: Pat
 
 
 @pytest.mark.parametrize("executor", EXECUTORS)
-def test_processes_that_cannot_do_the_work_end_it_with_one_reason(
-    out: Path, executor: Callable[[], Executor]
-) -> None:
+def test_processes_that_cannot_do_the_work_end_it_with_one_reason(out, executor) -> None:
     with executor() as pool, pytest.raises(UnfitWorkerError, match=r"worker .*model\.onnx"):
         results(out, Counting(out, unfit=True), pool)
     assert len(job_status(out, lambda record: None).missing) == 5
 
 
-def test_another_version_of_derain_is_refused(out: Path) -> None:
+def test_another_version_of_derain_is_refused(out) -> None:
     task = Task(begun(out), Counting(out), version="0.0.1")
     with pytest.raises(InputError, match=r"this command 0\.0\.1"):
         task.check()
 
 
-def test_an_executor_that_has_ended_is_reported_and_the_rest_is_done_later(out: Path) -> None:
+def test_an_executor_that_has_ended_is_reported_and_the_rest_is_done_later(out) -> None:
     with ProcessPoolExecutor(1) as pool, pytest.raises(InputError, match="ended before drive/"):
         results(out, Counting(out, killing=("drive/1",)), pool)
     assert results(out, Counting(out))[0] == ("drive/0 done", True)
 
 
-def test_the_status_names_what_is_to_be_done_again(out: Path) -> None:
+def test_the_status_names_what_is_to_be_done_again(out) -> None:
     job = Job.begin(out, OPTIONS, UNITS, Shard(0, 5, first=1))
     done = UNITS[:2]
     list(run(Task(job, Counting(out, failing=("drive/0",))), done))
@@ -132,7 +128,7 @@ def test_the_status_names_what_is_to_be_done_again(out: Path) -> None:
     assert status.array == "1,3-5"
 
 
-def test_a_folder_without_a_job_has_no_status(out: Path) -> None:
+def test_a_folder_without_a_job_has_no_status(out) -> None:
     (out / ".derain").mkdir()
     with pytest.raises(InputError, match="no records of a job"):
         Job.at(out)
@@ -145,7 +141,7 @@ def test_a_folder_without_a_job_has_no_status(out: Path) -> None:
         job_status(out, lambda record: None)
 
 
-def test_processes_in_another_folder_refuse_relative_paths(out: Path) -> None:
+def test_processes_in_another_folder_refuse_relative_paths(out) -> None:
     task = Task(begun(out), Counting(out), folder=out)
     with pytest.raises(InputError, match=f"they begin in {out}"):
         task.check()

@@ -1,7 +1,5 @@
 """Shards of a job: complete, disjoint, balanced, and the same for every task."""
 
-import random
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -18,9 +16,7 @@ def units_of(sizes: list[int]) -> list[Unit]:
 
 
 @given(SIZES, st.integers(1, 9), st.randoms())
-def test_shards_hold_each_unit_once_whatever_the_order(
-    sizes: list[int], count: int, generator: random.Random
-) -> None:
+def test_shards_hold_each_unit_once_whatever_the_order(sizes, count, generator) -> None:
     units = units_of(sizes)
     number_of = shard_numbers(units, count)
     assert number_of.keys() == {unit.id for unit in units}
@@ -31,16 +27,14 @@ def test_shards_hold_each_unit_once_whatever_the_order(
 
 
 @given(SIZES, st.integers(1, 9))
-def test_no_shard_is_larger_than_another_by_more_than_its_last_unit(
-    sizes: list[int], count: int
-) -> None:
+def test_no_shard_is_larger_than_another_by_more_than_its_last_unit(sizes, count) -> None:
     units = units_of(sizes)
     loads = [sum(unit.size for unit in Shard(n, count).of(units)) for n in range(count)]
     assert max(loads) - min(loads) <= max(sizes, default=0)
 
 
 @given(st.sets(st.integers(0, 300)))
-def test_an_array_expression_names_each_task_once(numbers: set[int]) -> None:
+def test_an_array_expression_names_each_task_once(numbers) -> None:
     named: list[int] = []
     for part in filter(None, array_expression(list(numbers)).split(",")):
         first, _, last = part.partition("-")

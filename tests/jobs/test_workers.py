@@ -20,7 +20,7 @@ def not_sendable() -> threading.Lock:
     return threading.Lock()
 
 
-def test_an_error_ends_what_is_done_and_begins_nothing_more(tmp_path: Path) -> None:
+def test_an_error_ends_what_is_done_and_begins_nothing_more(tmp_path) -> None:
     files = [tmp_path / str(number) for number in range(4)]
     futures = []
     with suppress(KeyboardInterrupt), WorkerPool(1) as pool:
@@ -32,12 +32,12 @@ def test_an_error_ends_what_is_done_and_begins_nothing_more(tmp_path: Path) -> N
     assert all(future.done() for future in futures)
 
 
-def test_all_work_is_done_at_the_end_of_the_block(tmp_path: Path) -> None:
+def test_all_work_is_done_at_the_end_of_the_block(tmp_path) -> None:
     with WorkerPool(2) as pool:
         futures = [pool.submit(begin, tmp_path / str(number), 0) for number in range(5)]
     assert [future.result() for future in futures] == ["0", "1", "2", "3", "4"]
 
 
-def test_an_answer_that_cannot_be_sent_is_an_error(tmp_path: Path) -> None:
+def test_an_answer_that_cannot_be_sent_is_an_error(tmp_path) -> None:
     with WorkerPool(1) as pool, pytest.raises(TypeError, match="cannot be sent"):
         pool.submit(not_sendable).result()

@@ -13,7 +13,7 @@ from derain.scan import Scan
 from derain.views.neighbours import Neighbourhoods, NeighbourView
 from derain.views.range_image import RangeView
 from derain.views.spherical_grid import SphericalGrid
-from derain.views.view import IGNORED, View
+from derain.views.view import IGNORED
 
 SIZES = (12, 0, 1, 30)
 
@@ -48,7 +48,7 @@ def test_a_batch_is_its_scans_one_after_the_other() -> None:
 
 
 @pytest.mark.parametrize("unlabelled", [1, 2])
-def test_a_batch_has_targets_only_if_every_scan_has(unlabelled: int) -> None:
+def test_a_batch_has_targets_only_if_every_scan_has(unlabelled) -> None:
     samples = [sample(9, labelled=False)] * unlabelled + [sample(5)] * (2 - unlabelled)
     assert Batch.of(samples).target is None
 
@@ -61,7 +61,7 @@ views = pytest.mark.parametrize(
 
 
 @views
-def test_cells_of_unknown_points_are_not_to_be_judged(view: View) -> None:
+def test_cells_of_unknown_points_are_not_to_be_judged(view) -> None:
     card = DataCard("ours", {0: "ground", 3: "rain", 9: "unknown"}, rain=(3,), unknown=(9,))
     rng = np.random.default_rng(0)
     scan = Scan.of(scene(200)).with_label(rng.choice([0, 3, 9], 200))
@@ -78,7 +78,7 @@ def test_cells_of_unknown_points_are_not_to_be_judged(view: View) -> None:
 
 @views
 @pytest.mark.parametrize("measured", [True, False])
-def test_only_a_batch_that_is_measured_carries_its_scans(view: View, measured: bool) -> None:
+def test_only_a_batch_that_is_measured_carries_its_scans(view, measured) -> None:
     scans = [Scan.of(scene(size, seed=size)) for size in (200, 0, 90)]
     seen = [view(scan) for scan in scans]
     pairs = zip(scans, seen, strict=True)

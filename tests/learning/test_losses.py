@@ -50,9 +50,7 @@ def lovasz_by_sets(probability: Tensor, target: Tensor) -> float:
 
 
 @given(seeds, st.integers(1, 12), st.integers(1, 3), st.sampled_from([1, 4, None]))
-def test_lovasz_is_the_extension_of_the_jaccard_loss(
-    seed: int, points: int, present: int, steps: int | None
-) -> None:
+def test_lovasz_is_the_extension_of_the_jaccard_loss(seed, points, present, steps) -> None:
     logits, target = random_case(seed, points, present=present)
     probability = logits.softmax(dim=1)
     if steps is not None:  # hard predictions, and equal errors
@@ -62,7 +60,7 @@ def test_lovasz_is_the_extension_of_the_jaccard_loss(
 
 
 @pytest.mark.parametrize("present", [1, 2, 3])
-def test_lovasz_has_the_gradient_of_its_value(present: int) -> None:
+def test_lovasz_has_the_gradient_of_its_value(present) -> None:
     logits, target = random_case(seed=5, present=present)
     assert torch.autograd.gradcheck(
         lambda logits: lovasz_softmax(logits.softmax(dim=1), target), logits.requires_grad_()
@@ -109,7 +107,7 @@ def test_no_points_give_zero_and_a_gradient() -> None:
     ids=["one point", "one raindrop", "no rain", "nothing but rain", "both"],
 )
 @pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
-def test_value_and_gradient_are_finite(scale: float, target: list[int], dtype: torch.dtype) -> None:
+def test_value_and_gradient_are_finite(scale, target, dtype) -> None:
     logits, _ = random_case(seed=8, points=len(target), classes=2)
     logits = (scale * logits).to(dtype).requires_grad_()
     loss = segmentation_loss(logits, torch.tensor(target), torch.tensor([1.07, 14.84]))
@@ -128,9 +126,7 @@ def test_autocast_changes_nothing() -> None:
 
 
 @given(seeds, st.integers(0, 40), st.sampled_from([1, 2]), st.booleans())
-def test_the_loss_is_the_sum_of_the_two(
-    seed: int, points: int, present: int, swapped: bool
-) -> None:
+def test_the_loss_is_the_sum_of_the_two(seed, points, present, swapped) -> None:
     logits, target = random_case(seed, points, classes=2, present=present)
     target = 1 - target if swapped else target
     weight = torch.tensor([1.07, 14.84])
@@ -148,6 +144,6 @@ def test_the_weight_of_a_class_that_never_occurs_is_finite() -> None:
 
 
 @pytest.mark.parametrize("share", [-0.1, 1.1, float("nan")])
-def test_a_share_that_is_none_is_refused(share: float) -> None:
+def test_a_share_that_is_none_is_refused(share) -> None:
     with pytest.raises(InputError, match="class shares"):
         class_weights([1.0, share])

@@ -24,9 +24,7 @@ def means(batches: list[tuple[float, float, int]]) -> dict[str, float]:
 
 
 @given(BATCHES, st.randoms())
-def test_each_batch_weighs_its_scans_and_the_order_does_not_matter(
-    batches: list[tuple[float, float, int]], shuffler: np.random.Generator
-) -> None:
+def test_each_batch_weighs_its_scans_and_the_order_does_not_matter(batches, shuffler) -> None:
     scans = sum(batch[2] for batch in batches)
     found = means(batches)
     for column, name in enumerate(("loss", "part")):

@@ -2,8 +2,6 @@
 
 import itertools
 
-import pytest
-
 from derain.learning.seeds import Draw, generator_of, run_seed
 
 
@@ -19,7 +17,7 @@ def test_no_two_draws_are_alike_and_each_is_always_the_same() -> None:
     assert drawn == [generator_of(*key).integers(2**63) for key in keys]
 
 
-def test_the_seed_is_the_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_seed_is_the_runs(monkeypatch) -> None:
     monkeypatch.delenv("PL_GLOBAL_SEED", raising=False)
     assert run_seed() == 0
     monkeypatch.setenv("PL_GLOBAL_SEED", "12345")  # as Lightning's seed_everything leaves it

@@ -78,7 +78,7 @@ def sample() -> Callable[..., Sample]:
 
 
 @pytest.fixture
-def image_network(small_grid: dict[str, Any]) -> Callable[..., Any]:
+def image_network(small_grid) -> Callable[..., Any]:
     """Makes a small SalsaNext or LiSnowNet in evaluation mode, of random weights, as for WADS."""
 
     def make(model_class: type[DerainingModule], **arguments: Any) -> DerainingModule:

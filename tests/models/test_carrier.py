@@ -26,14 +26,14 @@ def judged(near: int, beyond: int, others: int) -> tuple[Tensor, Tensor]:
 
 
 @pytest.mark.parametrize("near", [5, 60, 3000])
-def test_specks_right_before_the_sensor_are_no_drops_where_there_are_none_beyond(near: int) -> None:
+def test_specks_right_before_the_sensor_are_no_drops_where_there_are_none_beyond(near) -> None:
     before, after = judged(near, 0, 100_000)
     assert (after[:near] < -DROP).all()
     torch.testing.assert_close(after[near:], before[near:])
 
 
 @pytest.mark.parametrize("drops", [1, 20, 3000])
-def test_near_drops_stay_where_as_many_are_beyond(drops: int) -> None:
+def test_near_drops_stay_where_as_many_are_beyond(drops) -> None:
     before, after = judged(drops, drops, 100_000)
     torch.testing.assert_close(after, before)
 
@@ -47,7 +47,7 @@ def test_dense_near_rain_stays_where_a_share_of_the_scan_is_rain_beyond() -> Non
 
 
 @given(st.lists(st.tuples(st.floats(-30, 30), st.floats(0.05, 200)), max_size=30))
-def test_nothing_is_added_and_what_is_no_carrier_stays(points: list[tuple[float, float]]) -> None:
+def test_nothing_is_added_and_what_is_no_carrier_stays(points) -> None:
     before, ranges = torch.tensor(points).reshape(-1, 2).unbind(1)
     after = lowered(before, ranges)
     assert torch.isfinite(after).all()

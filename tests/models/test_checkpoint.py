@@ -6,7 +6,6 @@ import math
 import pickle
 import resource
 import tempfile
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -18,13 +17,12 @@ from lightning.pytorch.plugins.io import TorchCheckpointIO
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
-from derain.learning.batch import Batch, Sample
+from derain.learning.batch import Batch
 from derain.models.checkpoint import WholeCheckpoints, load_model, save_model
 from derain.models.outdet import PUBLISHED_KEYS, OutDet, OutDetNetwork
 from derain.models.published import read_checkpoint, read_state_dict
 from derain.spec import SCHEMA
 
-MakeModel = Callable[..., OutDet]
 DAMAGED = "damaged, or holds more than tensors and plain values"
 
 
@@ -39,20 +37,18 @@ class Code:
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
+def path(tmp_path) -> Path:
     return tmp_path / "model.ckpt"
 
 
 @pytest.fixture
-def content(outdet: MakeModel, path: Path) -> dict[str, Any]:
+def content(outdet, path) -> dict[str, Any]:
     """What a checkpoint holds, in the file as well."""
     save_model(outdet(neighbours=5), path)
     return torch.load(path, weights_only=True)
 
 
-def test_a_model_comes_back_as_it_was(
-    outdet: MakeModel, sample: Callable[..., Sample], path: Path
-) -> None:
+def test_a_model_comes_back_as_it_was(outdet, sample, path) -> None:
     model = outdet(seed=1, neighbours=5)
     model.hparams.update(learning_rate=0.5, milestones=(1, 2), threshold=0.25)
     save_model(model, path)
@@ -65,7 +61,7 @@ def test_a_model_comes_back_as_it_was(
     assert torch.equal(copy(**batch.inputs), model(**batch.inputs))
 
 
-def test_hyper_parameters_are_primitives_only(content: dict[str, Any]) -> None:
+def test_hyper_parameters_are_primitives_only(content) -> None:
     parameters = dict(content["hyper_parameters"])
     tuples = {name: parameters.pop(name) for name in ("channels", "milestones")}
     assert json.loads(json.dumps(parameters)) == parameters
@@ -83,9 +79,7 @@ def test_hyper_parameters_are_primitives_only(content: dict[str, Any]) -> None:
     ],
     ids=str,
 )
-def test_a_checkpoint_of_something_else_is_refused(
-    content: dict[str, Any], path: Path, change: dict[str, Any]
-) -> None:
+def test_a_checkpoint_of_something_else_is_refused(content, path, change) -> None:
     changed = {key: value for key, value in {**content, **change}.items() if value is not None}
     torch.save(changed, path)
     with pytest.raises(InputError, match=r"model\.ckpt: not a checkpoint of derain"):
@@ -108,9 +102,7 @@ def test_a_checkpoint_of_something_else_is_refused(
     ],
     ids=str,
 )
-def test_a_spec_that_the_network_cannot_have_is_refused(
-    content: dict[str, Any], path: Path, change: dict[str, Any], reason: str
-) -> None:
+def test_a_spec_that_the_network_cannot_have_is_refused(content, path, change, reason) -> None:
     content["hyper_parameters"]["spec"] |= change
     torch.save(content, path)
     with pytest.raises(InputError, match=rf"model\.ckpt: {reason}"):
@@ -118,9 +110,7 @@ def test_a_spec_that_the_network_cannot_have_is_refused(
 
 
 @pytest.mark.parametrize("part", ["weights", "parameters"])
-def test_weights_that_do_not_fit_are_refused_in_one_line(
-    content: dict[str, Any], path: Path, part: str
-) -> None:
+def test_weights_that_do_not_fit_are_refused_in_one_line(content, path, part) -> None:
     if part == "weights":
         content["state_dict"].pop("network.head.bias")
     else:
@@ -140,9 +130,7 @@ def test_weights_that_do_not_fit_are_refused_in_one_line(
     ],
     ids=str,
 )
-def test_hyper_parameters_that_cannot_be_take_no_memory(
-    content: dict[str, Any], path: Path, change: dict[str, Any]
-) -> None:
+def test_hyper_parameters_that_cannot_be_take_no_memory(content, path, change) -> None:
     content["hyper_parameters"].update(change)
     torch.save(content, path)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -163,9 +151,7 @@ def test_hyper_parameters_that_cannot_be_take_no_memory(
     ],
     ids=["integers", "complex", "another shape", "very many", "a list", "a text"],
 )
-def test_tensors_of_another_kind_are_refused(
-    content: dict[str, Any], path: Path, wrong: Any
-) -> None:
+def test_tensors_of_another_kind_are_refused(content, path, wrong) -> None:
     content["state_dict"]["network.head.bias"] = wrong
     torch.save(content, path)
     with pytest.raises(InputError, match=r"model\.ckpt: its weights do not fit outdet"):
@@ -173,9 +159,7 @@ def test_tensors_of_another_kind_are_refused(
 
 
 @pytest.mark.parametrize("read", [load_model, read_state_dict])
-def test_a_compressed_checkpoint_is_refused(
-    content: dict[str, Any], path: Path, read: Callable[[Path], Any]
-) -> None:
+def test_a_compressed_checkpoint_is_refused(content, path, read) -> None:
     parts = ZipFile(io.BytesIO(path.read_bytes()))
     with ZipFile(path, "w", ZIP_DEFLATED) as bomb:
         for name in parts.namelist():
@@ -195,7 +179,7 @@ def test_published_weights_do_not_say_how_much_memory_to_take() -> None:
 
 
 @pytest.mark.parametrize("share", [0.0, 0.001, 0.5, 0.9999])
-def test_a_truncated_file_is_refused(content: dict[str, Any], path: Path, share: float) -> None:
+def test_a_truncated_file_is_refused(content, path, share) -> None:
     whole = path.read_bytes()
     path.write_bytes(whole[: int(share * len(whole))])
     with pytest.raises(InputError, match=rf"model\.ckpt: {DAMAGED}"):
@@ -203,7 +187,7 @@ def test_a_truncated_file_is_refused(content: dict[str, Any], path: Path, share:
 
 
 @pytest.mark.parametrize("text", [b"hello", b"\x80\x02.", bytes(1000)], ids=repr)
-def test_a_file_of_something_else_is_refused(path: Path, text: bytes) -> None:
+def test_a_file_of_something_else_is_refused(path, text) -> None:
     path.write_bytes(text)
     with pytest.raises(InputError, match=rf"model\.ckpt: {DAMAGED}"):
         load_model(path)
@@ -211,9 +195,7 @@ def test_a_file_of_something_else_is_refused(path: Path, text: bytes) -> None:
 
 @pytest.mark.parametrize("writer", ["torch", "pickle"])
 @pytest.mark.parametrize("read", [load_model, read_state_dict])
-def test_code_in_a_file_does_not_run(
-    content: dict[str, Any], tmp_path: Path, path: Path, writer: str, read: Callable[[Path], Any]
-) -> None:
+def test_code_in_a_file_does_not_run(content, tmp_path, path, writer, read) -> None:
     witness = tmp_path / "the code ran"
     content["callbacks"] = Code(witness)
     if writer == "torch":
@@ -230,12 +212,12 @@ def test_code_in_a_file_does_not_run(
 
 
 @pytest.mark.parametrize("read", [load_model, read_state_dict, read_checkpoint])
-def test_a_file_that_is_not_there_is_named(tmp_path: Path, read: Callable[[Path], Any]) -> None:
+def test_a_file_that_is_not_there_is_named(tmp_path, read) -> None:
     with pytest.raises(InputError, match=r"nowhere\.pt: there is no such file"):
         read(tmp_path / "nowhere.pt")
 
 
-def test_a_published_state_dict_is_read_from_a_training_checkpoint_too(path: Path) -> None:
+def test_a_published_state_dict_is_read_from_a_training_checkpoint_too(path) -> None:
     weights = {"module.fc.bias": torch.ones(2), "module.fc.weight": torch.zeros(2, 32)}
     for content in (weights, {"epoch": 3, "state_dict": weights}):
         torch.save(content, path)
@@ -253,15 +235,13 @@ def test_a_published_state_dict_is_read_from_a_training_checkpoint_too(path: Pat
         ({3: torch.ones(2)}, "not a state_dict of tensors"),
     ],
 )
-def test_what_is_no_state_dict_is_refused(path: Path, content: Any, reason: str) -> None:
+def test_what_is_no_state_dict_is_refused(path, content, reason) -> None:
     torch.save(content, path)
     with pytest.raises(InputError, match=rf"model\.ckpt: {reason}"):
         read_state_dict(path)
 
 
-def test_nothing_is_written_outside_the_folder(
-    outdet: Callable[..., OutDet], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_nothing_is_written_outside_the_folder(outdet, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
     save_model(outdet(), tmp_path / "runs" / "model.ckpt")
     assert list((tmp_path / "runs").iterdir()) == [tmp_path / "runs" / "model.ckpt"]
@@ -269,7 +249,7 @@ def test_nothing_is_written_outside_the_folder(
 
 
 def test_the_checkpoint_that_is_there_stays_until_the_next_is_whole(
-    outdet: Callable[..., OutDet], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    outdet, tmp_path, monkeypatch
 ) -> None:
     path = tmp_path / "model.ckpt"
     save_model(outdet(seed=0), path)
@@ -289,9 +269,7 @@ def test_the_checkpoint_that_is_there_stays_until_the_next_is_whole(
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf])
-def test_weights_that_are_not_finite_take_no_checkpoints_place(
-    tmp_path: Path, value: float
-) -> None:
+def test_weights_that_are_not_finite_take_no_checkpoints_place(tmp_path, value) -> None:
     path = tmp_path / "best.ckpt"
     path.write_bytes(b"the last good one")
     with pytest.raises(InputError, match=r"best\.ckpt: the weights head are not finite"):
@@ -305,7 +283,7 @@ def test_an_address_is_left_to_lightning() -> None:
     assert checkpoints.load_checkpoint("memory://runs/model.ckpt") == {"epoch": 3}
 
 
-def test_a_checkpoint_holds_what_lightning_would_write(tmp_path: Path) -> None:
+def test_a_checkpoint_holds_what_lightning_would_write(tmp_path) -> None:
     content = {"state_dict": {"weight": torch.arange(3.0)}, "epoch": 2}
     for writer, name in ((WholeCheckpoints(), "ours"), (TorchCheckpointIO(), "lightning")):
         writer.save_checkpoint(content, tmp_path / name)

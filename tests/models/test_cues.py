@@ -44,7 +44,7 @@ def trained() -> CueFusion:
 
 
 @pytest.fixture(scope="module")
-def exported(trained: CueFusion, tmp_path_factory: pytest.TempPathFactory) -> Derainer:
+def exported(trained, tmp_path_factory) -> Derainer:
     path = tmp_path_factory.mktemp("cues") / "model.onnx"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(onnx_file, "hard_cases", lambda: hard_cases(largest=3000))
@@ -52,7 +52,7 @@ def exported(trained: CueFusion, tmp_path_factory: pytest.TempPathFactory) -> De
     return Derainer(path, threads=1)
 
 
-def test_brightness_helps_whatever_its_unit(exported: Derainer) -> None:
+def test_brightness_helps_whatever_its_unit(exported) -> None:
     scan = labelled(20)
     rain = scan.label == 110
     called = exported(scan)
@@ -67,9 +67,7 @@ def test_brightness_helps_whatever_its_unit(exported: Derainer) -> None:
 
 
 @pytest.mark.parametrize("doubt", [-20, 20])
-def test_without_intensities_rain_is_the_likelier_the_more_of_it_there_is(
-    trained: CueFusion, doubt: float
-) -> None:
+def test_without_intensities_rain_is_the_likelier_the_more_of_it_there_is(trained, doubt) -> None:
     scan, network, view = labelled(23), deepcopy(trained.network), trained.spec.make_view()
     network.rounds[-1][-1].bias.data -= doubt
 
@@ -92,7 +90,7 @@ def test_without_intensities_rain_is_the_likelier_the_more_of_it_there_is(
 
 @pytest.mark.parametrize(("drops", "are_rain"), [(0, False), (60, True)])
 def test_dim_specks_right_before_the_sensor_alone_are_its_carrier(
-    exported: Derainer, drops: int, are_rain: bool
+    exported, drops, are_rain
 ) -> None:
     scan = labelled(22, drops=0)
     far = scan.take(np.linalg.norm(scan.xyz, axis=1) > 6.5)
@@ -105,7 +103,7 @@ def test_dim_specks_right_before_the_sensor_alone_are_its_carrier(
     assert ((specks > 0.5) == are_rain).all()
 
 
-def test_points_without_intensity_are_judged_as_in_a_scan_that_has_none(exported: Derainer) -> None:
+def test_points_without_intensity_are_judged_as_in_a_scan_that_has_none(exported) -> None:
     scan = labelled(25)
     dark = np.arange(len(scan)) % 3 == 0
     intensity = np.where(dark, np.float32(np.nan), scan.intensity)
@@ -118,14 +116,14 @@ def test_points_without_intensity_are_judged_as_in_a_scan_that_has_none(exported
     assert judgement.share_of_rain == judgement.rain.mean()
 
 
-def test_rows_in_another_order_are_judged_alike(exported: Derainer) -> None:
+def test_rows_in_another_order_are_judged_alike(exported) -> None:
     scan = labelled(21)
     order = np.random.default_rng(0).permutation(len(scan))
     shuffled = exported.probability(scan.take(order))
     np.testing.assert_allclose(shuffled, exported.probability(scan)[order], atol=1e-4)
 
 
-def test_scans_of_a_batch_say_nothing_to_each_other(trained: CueFusion) -> None:
+def test_scans_of_a_batch_say_nothing_to_each_other(trained) -> None:
     view = trained.spec.make_view()
     scans = [labelled(30), labelled(31, drops=30)]
     samples = [
@@ -144,9 +142,7 @@ def test_it_needs_its_neighbours_and_a_start_of_its_kind() -> None:
 
 
 @pytest.mark.parametrize("turn", [0.3, 2.0, np.pi])
-def test_neighbours_in_steps_are_the_same_in_every_direction_and_at_every_range(
-    turn: float,
-) -> None:
+def test_neighbours_in_steps_are_the_same_in_every_direction_and_at_every_range(turn) -> None:
     generator = np.random.default_rng(0)
     points = generator.normal((10, 0, 0), 1, (40, 3))
     neighbours = torch.tensor(np.stack([generator.permutation(40)[:5] for _ in range(12)], 1))
@@ -210,7 +206,7 @@ def expected(rain: np.ndarray, rest: np.ndarray) -> np.ndarray:
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_log_odds_are_those_of_smoothed_counts(seed: int) -> None:
+def test_log_odds_are_those_of_smoothed_counts(seed) -> None:
     counts, cell, probability = drawn(seed)
     rain, rest = np.zeros((2, SHELLS, INTENSITY_RANKS))
     for number, p in zip(cell.tolist(), probability.tolist(), strict=True):

@@ -1,13 +1,10 @@
 """There is no scan that a network cannot take a training step on, and judge."""
 
-from collections.abc import Callable
-from typing import Any
-
 import pytest
 import torch
 
 from derain.evaluation.hard_cases import hard_cases, scene
-from derain.learning.batch import Batch, Sample
+from derain.learning.batch import Batch
 from derain.models.base import DerainingModule
 from derain.models.lisnownet import LiSnowNet
 from derain.models.outdet import OutDet
@@ -17,13 +14,10 @@ from derain.scan import Scan
 
 FEW = {f"{points} points": Scan.of(scene(300)[:points]) for points in (0, 1, 2, 5)}
 HARD_CASES = {**dict(hard_cases(largest=5000)), **FEW}
-MakeSample = Callable[..., Sample]
 
 
 @pytest.fixture(params=[OutDet, SalsaNext, SalsaNextLite, LiSnowNet])
-def model(
-    request: pytest.FixtureRequest, outdet: Callable[..., OutDet], image_network: Callable[..., Any]
-) -> DerainingModule:
+def model(request, outdet, image_network) -> DerainingModule:
     """A network of random weights."""
     return outdet() if request.param is OutDet else image_network(request.param)
 
@@ -46,9 +40,7 @@ def step(model: DerainingModule, batch: Batch, bfloat16: bool = False) -> None:
 
 
 @pytest.mark.parametrize("scan", HARD_CASES.values(), ids=HARD_CASES)
-def test_a_hard_scan_can_be_learnt_from_and_judged(
-    model: DerainingModule, image_sample: MakeSample, scan: Scan
-) -> None:
+def test_a_hard_scan_can_be_learnt_from_and_judged(model, image_sample, scan) -> None:
     batch = Batch.of([image_sample(model, scan)])
     step(model, batch)
     model.eval()
@@ -64,22 +56,16 @@ def test_a_hard_scan_can_be_learnt_from_and_judged(
 @pytest.mark.parametrize(
     "name", ["empty", "one point", "near and far together", "constant image", "intensity 65,535"]
 )
-def test_a_hard_scan_can_be_learnt_from_in_bfloat16(
-    model: DerainingModule, image_sample: MakeSample, name: str
-) -> None:
+def test_a_hard_scan_can_be_learnt_from_in_bfloat16(model, image_sample, name) -> None:
     step(model, Batch.of([image_sample(model, HARD_CASES[name])]), bfloat16=True)
 
 
 @pytest.mark.parametrize("rain", [0.0, 1.0], ids=["no rain", "nothing but rain"])
-def test_hard_scans_of_one_class_can_be_learnt_from_together(
-    model: DerainingModule, image_sample: MakeSample, rain: float
-) -> None:
+def test_hard_scans_of_one_class_can_be_learnt_from_together(model, image_sample, rain) -> None:
     step(model, Batch.of([image_sample(model, scan, rain) for scan in HARD_CASES.values()]))
 
 
-def test_fewer_than_two_points_leave_the_running_statistics_alone(
-    outdet: Callable[..., OutDet], image_sample: MakeSample
-) -> None:
+def test_fewer_than_two_points_leave_the_running_statistics_alone(outdet, image_sample) -> None:
     model = outdet()
     before = {name: tensor.clone() for name, tensor in model.network.norm1.named_buffers()}
     for points in (0, 1):

@@ -26,7 +26,7 @@ def entered(folder: Path) -> Any:
     return values, columns, events.Tags()["scalars"]
 
 
-def test_a_run_has_its_parameters_and_columns_that_stay_blank(tmp_path: Path) -> None:
+def test_a_run_has_its_parameters_and_columns_that_stay_blank(tmp_path) -> None:
     logger = TensorBoardLogger(tmp_path, "", "log")
     parameters = {
         **{"learning_rate": 0.01, "neighbours": 9, "network": "outdet", "blind": True},

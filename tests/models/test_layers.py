@@ -22,9 +22,7 @@ def image_of(height: int, width: int) -> torch.Tensor:
 @pytest.mark.parametrize("memory_format", FORMATS, ids=str)
 @pytest.mark.parametrize(("height", "width", "margin"), SIZES)
 @pytest.mark.parametrize("gradient", [False, True])
-def test_it_goes_round_and_is_mirrored(
-    height: int, width: int, margin: int, gradient: bool, memory_format: torch.memory_format
-) -> None:
+def test_it_goes_round_and_is_mirrored(height, width, margin, gradient, memory_format) -> None:
     image = image_of(height, width)
     wide = np.pad(image, ((0, 0), (0, 0), (0, 0), (margin, margin)), mode="wrap")
     expected = np.pad(wide, ((0, 0), (0, 0), (margin, margin), (0, 0)), mode="reflect")
@@ -34,9 +32,7 @@ def test_it_goes_round_and_is_mirrored(
 
 @pytest.mark.parametrize("memory_format", FORMATS, ids=str)
 @pytest.mark.parametrize(("height", "width", "margin"), SIZES)
-def test_its_gradient_is_that_of_its_value(
-    height: int, width: int, margin: int, memory_format: torch.memory_format
-) -> None:
+def test_its_gradient_is_that_of_its_value(height, width, margin, memory_format) -> None:
     image = image_of(height, width).contiguous(memory_format=memory_format).requires_grad_()
     assert torch.autograd.gradcheck(lambda image: pad_around(image, margin), image)
 
@@ -47,9 +43,7 @@ def test_its_gradient_is_that_of_its_value(
     multiple=st.integers(1, 20),
     value=st.sampled_from([0.0, -1.0]),
 )
-def test_new_pixels_are_below_and_on_the_right(
-    height: int, width: int, multiple: int, value: float
-) -> None:
+def test_new_pixels_are_below_and_on_the_right(height, width, multiple, value) -> None:
     image = np.random.default_rng(0).normal(size=(2, 3, height, width)).astype(np.float32)
     below = next(n for n in range(multiple) if (height + n) % multiple == 0)
     right = next(n for n in range(multiple) if (width + n) % multiple == 0)
@@ -72,7 +66,7 @@ def gradients(norm: nn.BatchNorm2d, image: Tensor) -> list[Tensor]:
 
 
 @pytest.mark.parametrize("memory_format", [torch.contiguous_format, torch.channels_last], ids=str)
-def test_the_gradient_is_pytorchs(memory_format: torch.memory_format) -> None:
+def test_the_gradient_is_pytorchs(memory_format) -> None:
     image = torch.randn(2, 3, 5, 7, dtype=torch.double, generator=torch.Generator().manual_seed(0))
     expected = gradients(nn.BatchNorm2d(3).double(), image.clone().requires_grad_())
     seen = image.contiguous(memory_format=memory_format).requires_grad_()

@@ -11,7 +11,7 @@ INPUTS, OUTPUTS, K, POINTS = 3, 4, 5, 11
 
 
 @pytest.fixture(autouse=True)
-def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+def small_blocks(monkeypatch) -> None:
     monkeypatch.setattr(network, "POINT_BLOCK", 4)  # 11 points: two blocks and a part
 
 
@@ -24,14 +24,14 @@ def case(rows: int = POINTS) -> tuple[Tensor, Tensor, Tensor]:
 
 
 @pytest.mark.parametrize("rows", [0, 1, 4, 8, POINTS], ids=str)
-def test_it_is_a_sum_over_neighbours_and_channels(rows: int) -> None:
+def test_it_is_a_sum_over_neighbours_and_channels(rows) -> None:
     features, neighbours, weight = case(rows)
     expected = torch.einsum("pji,ioj->po", features[neighbours], weight)
     torch.testing.assert_close(convolve(features, neighbours, weight), expected)
 
 
 @pytest.mark.parametrize("rows", [0, 3, POINTS], ids=str)
-def test_its_gradient_is_that_of_the_sum(rows: int) -> None:
+def test_its_gradient_is_that_of_the_sum(rows) -> None:
     features, neighbours, weight = case(rows)
     features.requires_grad_(), weight.requires_grad_()
     assert torch.autograd.gradcheck(lambda f, w: convolve(f, neighbours, w), (features, weight))

@@ -1,8 +1,5 @@
 """3D-OutDet computes what was published, whatever it is given."""
 
-from collections.abc import Callable
-from pathlib import Path
-
 import numpy as np
 import pytest
 import torch
@@ -18,9 +15,6 @@ from derain.models.published import read_state_dict
 from derain.scan import Scan
 from derain.views.candidates import Bound, Candidates
 from derain.views.neighbours import NeighbourView
-
-MakeModel = Callable[..., OutDet]
-MakeSample = Callable[..., Sample]
 
 
 def published(network: OutDetNetwork) -> dict[str, Tensor]:
@@ -66,9 +60,7 @@ def inputs_of(sample: Sample) -> dict[str, Tensor]:
 
 @pytest.mark.parametrize("training", [False, True], ids=["evaluation", "training"])
 @pytest.mark.parametrize(("seed", "neighbours"), [(0, 9), (1, 9), (2, 4), (3, 1)])
-def test_the_network_is_the_published_formula(
-    outdet: MakeModel, sample: MakeSample, seed: int, neighbours: int, training: bool
-) -> None:
+def test_the_network_is_the_published_formula(outdet, sample, seed, neighbours, training) -> None:
     network = outdet(seed, neighbours).network.double().train(training)
     network.dropout.p = 0.0
     view = sample(scene(400, seed), neighbours).view
@@ -82,7 +74,7 @@ def test_the_network_is_the_published_formula(
     np.testing.assert_allclose(logits.detach(), expected, rtol=1e-9, atol=1e-9)
 
 
-def test_the_model_normalises_what_the_network_sees(outdet: MakeModel, sample: MakeSample) -> None:
+def test_the_model_normalises_what_the_network_sees(outdet, sample) -> None:
     model, view = outdet(4), sample(scene(400)).view
     points = (view.points.astype(np.float64) - model.spec.mean) / model.spec.std
     expected = as_published(
@@ -93,7 +85,7 @@ def test_the_model_normalises_what_the_network_sees(outdet: MakeModel, sample: M
 
 
 @torch.no_grad()
-def test_candidates_are_scored_as_they_are_among_all(outdet: MakeModel, sample: MakeSample) -> None:
+def test_candidates_are_scored_as_they_are_among_all(outdet, sample) -> None:
     model = outdet(seed=6)
     candidates = Candidates((Bound("range", most=20.0),))
     scans = [Scan.of(scene(size, size)) for size in (300, 5, 200)]
@@ -111,12 +103,12 @@ def test_it_has_as_many_parameters_as_published() -> None:
 
 
 @pytest.mark.parametrize("channels", [(), ("x", "y", "x")], ids=str)
-def test_channels_are_named_once_each(channels: tuple[str, ...]) -> None:
+def test_channels_are_named_once_each(channels) -> None:
     with pytest.raises(InputError, match="Name each channel once"):
         OutDet(channels=channels)
 
 
-def test_a_spec_of_another_network_or_of_other_channels_is_refused(outdet: MakeModel) -> None:
+def test_a_spec_of_another_network_or_of_other_channels_is_refused(outdet) -> None:
     with pytest.raises(InputError, match="a model of salsanext"):
         OutDet(spec={**outdet().spec.as_dict(), "network": "salsanext"})
     with pytest.raises(InputError, match="Give one of outdet on x, y, z, rcs"):
@@ -124,9 +116,7 @@ def test_a_spec_of_another_network_or_of_other_channels_is_refused(outdet: MakeM
 
 
 @torch.no_grad()
-def test_a_folded_network_computes_the_same_from_further_channels(
-    outdet: MakeModel, sample: MakeSample
-) -> None:
+def test_a_folded_network_computes_the_same_from_further_channels(outdet, sample) -> None:
     model = outdet(channels=("rcs", "x", "y", "z", "radar", "intensity"))
     inputs = inputs_of(sample(scene()))
     six = torch.randn(len(inputs["points"]), 6, generator=torch.Generator().manual_seed(0))
@@ -136,9 +126,7 @@ def test_a_folded_network_computes_the_same_from_further_channels(
 
 @pytest.mark.parametrize("neighbours", [9, 3])
 @pytest.mark.parametrize("prefix", ["", "module."])
-def test_published_weights_are_taken_over(
-    outdet: MakeModel, sample: MakeSample, prefix: str, neighbours: int
-) -> None:
+def test_published_weights_are_taken_over(outdet, sample, prefix, neighbours) -> None:
     network = outdet(5, neighbours).network
     weights = {prefix + key: tensor for key, tensor in published(network).items()}
     inputs = inputs_of(sample(scene(200), neighbours))
@@ -149,7 +137,7 @@ def test_published_weights_are_taken_over(
     assert (model.spec.data, model.spec.mean) == ("WADS", load_card("wads").mean)
 
 
-def test_weights_need_a_card_with_statistics(outdet: MakeModel) -> None:
+def test_weights_need_a_card_with_statistics(outdet) -> None:
     with pytest.raises(InputError, match="REHEARSE-3D: the data card has no statistics of x"):
         OutDet.from_published(published(outdet().network), load_card("rehearse3d"))
 
@@ -165,9 +153,7 @@ def test_weights_need_a_card_with_statistics(outdet: MakeModel) -> None:
     ],
     ids=["head", "neighbours", "scalar", "surplus", "missing"],
 )
-def test_weights_of_another_network_are_refused(
-    outdet: MakeModel, change: dict[str, Tensor | None]
-) -> None:
+def test_weights_of_another_network_are_refused(outdet, change) -> None:
     weights = {**published(outdet().network), **change}
     weights = {key: tensor for key, tensor in weights.items() if tensor is not None}
     with pytest.raises(InputError, match="3D-OutDet: the state_dict is of another network"):
@@ -175,7 +161,7 @@ def test_weights_of_another_network_are_refused(
 
 
 @pytest.fixture(scope="module")
-def on_wads(shared: Path) -> tuple[OutDet, Sample, Tensor]:
+def on_wads(shared) -> tuple[OutDet, Sample, Tensor]:
     """The published weights, the published scan, and the logits of the one for the other."""
     model = OutDet.from_published(
         read_state_dict(shared / "oracles/outdet_wads.pt"), load_card("wads")
@@ -188,9 +174,7 @@ def on_wads(shared: Path) -> tuple[OutDet, Sample, Tensor]:
         return model, one, model(**inputs_of(one))
 
 
-def test_published_weights_give_the_published_logits(
-    shared: Path, on_wads: tuple[OutDet, Sample, Tensor]
-) -> None:
+def test_published_weights_give_the_published_logits(shared, on_wads) -> None:
     model, one, logits = on_wads
     oracle = np.load(shared / "oracles/outdet_wads.npz")["logits"]
     assert sorted(one.view.first) == list(range(len(oracle)))
@@ -201,9 +185,7 @@ def test_published_weights_give_the_published_logits(
 
 
 @pytest.mark.parametrize(("seed", "neighbours"), [(0, 9), (1, 4)])
-def test_the_folded_network_computes_the_same(
-    outdet: MakeModel, sample: MakeSample, seed: int, neighbours: int
-) -> None:
+def test_the_folded_network_computes_the_same(outdet, sample, seed, neighbours) -> None:
     model = outdet(seed, neighbours)
     inputs = inputs_of(sample(scene(500, seed), neighbours))
     logits, folded = model(**inputs), model.deployed()(**inputs)
@@ -211,7 +193,7 @@ def test_the_folded_network_computes_the_same(
     torch.testing.assert_close(folded, logits, atol=2e-4, rtol=2e-4)
 
 
-def test_packed_scans_get_the_logits_they_get_alone(outdet: MakeModel, sample: MakeSample) -> None:
+def test_packed_scans_get_the_logits_they_get_alone(outdet, sample) -> None:
     model = outdet()
     samples = [sample(scene(points, points)) for points in (300, 0, 7, 1, 500)]
     batch = Batch.of(samples)

@@ -17,12 +17,12 @@ POINTS = (300, 40, 500, 120, 260)
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path) -> Path:
     """Labelled scenes of many sizes."""
     return write_scenes(tmp_path, *POINTS, rain=110)
 
 
-def test_two_processes_find_what_one_finds(folder: Path) -> None:
+def test_two_processes_find_what_one_finds(folder) -> None:
     finished = subprocess.run(
         [sys.executable, two_processes.__file__, folder],
         capture_output=True,

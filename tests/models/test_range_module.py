@@ -1,8 +1,5 @@
 """Networks on range images alike: their grid, empty pixels, batches, and as they are exported."""
 
-from collections.abc import Callable
-from typing import Any
-
 import pytest
 import torch
 
@@ -10,7 +7,6 @@ from derain.cards.card import load_card
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.learning.batch import Batch, Sample
-from derain.models.base import DerainingModule
 from derain.models.lisnownet import LiSnowNet
 from derain.models.salsanext import SalsaNext
 from derain.models.salsanext_lite import SalsaNextLite
@@ -19,15 +15,12 @@ from derain.views.grid_fit import fit_grid
 from derain.views.range_image import RangeView
 from derain.views.spherical_grid import grid_of
 
-MakeModel = Callable[..., DerainingModule]
-MakeSample = Callable[..., Sample]
-
 all_models = pytest.mark.parametrize("model_class", [SalsaNext, SalsaNextLite, LiSnowNet])
 both_views = pytest.mark.parametrize("model_class", [SalsaNext, LiSnowNet])
 
 
 @both_views
-def test_a_grid_is_fitted_to_the_training_scans(model_class: type[DerainingModule]) -> None:
+def test_a_grid_is_fitted_to_the_training_scans(model_class) -> None:
     scans = [Scan.of(scene(500, seed)) for seed in range(3)]
     spec = model_class(width=2).spec_for(load_card("wads"), scans)
     expected = fit_grid(scans).grid
@@ -42,7 +35,7 @@ def test_a_grid_is_fitted_to_the_training_scans(model_class: type[DerainingModul
 
 
 @both_views
-def test_a_grid_is_not_fitted_to_nothing(model_class: type[DerainingModule]) -> None:
+def test_a_grid_is_not_fitted_to_nothing(model_class) -> None:
     with pytest.raises(InputError, match=r"no scans to fit it to\. Give a grid by its name\."):
         model_class(width=2).spec_for(load_card("wads"))
 
@@ -53,9 +46,7 @@ def test_a_grid_is_not_fitted_to_nothing(model_class: type[DerainingModule]) -> 
     ["semantickitti", "rehearse3d", "wads", {"rows": 8, "columns": 30, "inclination": [-9, 5]}],
     ids=str,
 )
-def test_a_stated_grid_is_taken_whatever_the_scans(
-    model_class: type[DerainingModule], grid: str | dict[str, Any]
-) -> None:
+def test_a_stated_grid_is_taken_whatever_the_scans(model_class, grid) -> None:
     model = model_class(grid=grid, width=2, back_projection="vote")
     for scans in ([], [Scan.of(scene(100))]):
         expected = {"kind": "range", "grid": grid_of(grid, "").as_dict(), "way_back": "vote"}
@@ -70,9 +61,7 @@ def test_a_stated_grid_is_taken_whatever_the_scans(
         ({"grid": {"rows": 8}}, "grid: columns is missing"),
     ],
 )
-def test_a_view_that_there_is_not_is_refused(
-    model_class: type[DerainingModule], arguments: dict[str, Any], reason: str
-) -> None:
+def test_a_view_that_there_is_not_is_refused(model_class, arguments, reason) -> None:
     with pytest.raises(InputError) as refusal:
         model_class(**arguments, width=2).spec_for(load_card("wads")).make_view()
     assert reason in str(refusal.value)
@@ -82,10 +71,7 @@ def test_a_view_that_there_is_not_is_refused(
 @pytest.mark.parametrize("content", [0.0, -1.0, 1e6, torch.nan])
 @torch.no_grad()
 def test_what_empty_pixels_hold_does_not_matter(
-    image_network: MakeModel,
-    image_sample: MakeSample,
-    model_class: type[DerainingModule],
-    content: float,
+    image_network, image_sample, model_class, content
 ) -> None:
     model = image_network(model_class)
     inputs = Batch.of([image_sample(model, scene())]).inputs
@@ -99,7 +85,7 @@ def test_what_empty_pixels_hold_does_not_matter(
 @all_models
 @torch.no_grad()
 def test_packed_scans_get_the_logits_they_get_alone(
-    image_network: MakeModel, image_sample: MakeSample, model_class: type[DerainingModule]
+    image_network, image_sample, model_class
 ) -> None:
     model = image_network(model_class).double()
     samples = [image_sample(model, scene(points, points)) for points in (300, 0, 7, 3000)]
@@ -114,9 +100,7 @@ def test_packed_scans_get_the_logits_they_get_alone(
 
 @all_models
 @torch.no_grad()
-def test_the_deployed_network_computes_the_same(
-    image_network: MakeModel, image_sample: MakeSample, model_class: type[DerainingModule]
-) -> None:
+def test_the_deployed_network_computes_the_same(image_network, image_sample, model_class) -> None:
     model = image_network(model_class)
     inputs = Batch.of([image_sample(model, scene())]).inputs
     # Where a BatchNorm is folded into its convolution, sums are rounded elsewhere.

@@ -46,7 +46,7 @@ def logits(network: RelativeOutDetNetwork, xyz: np.ndarray) -> Tensor:
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 @pytest.mark.parametrize("context", [0, 16])
-def test_the_rest_of_a_scan_matters_by_its_context_alone(seed: int, context: int) -> None:
+def test_the_rest_of_a_scan_matters_by_its_context_alone(seed, context) -> None:
     """What is four times as far off is no one's neighbour, and on beams of the same step."""
     torch.manual_seed(seed)
     network = RelativeOutDetNetwork(context=context).eval()
@@ -75,7 +75,7 @@ def test_a_step_of_even_beams_is_one_step() -> None:
 
 
 @pytest.mark.parametrize("scale", [0.25, 4.0])
-def test_what_is_seen_does_not_depend_on_how_far_the_scene_is(scale: float) -> None:
+def test_what_is_seen_does_not_depend_on_how_far_the_scene_is(scale) -> None:
     generator = np.random.default_rng(0)
     xyz = sphere(20, 40, 0.01, 12.0) * generator.uniform(0.9, 1.1, (800, 1)).astype(np.float32)
     near, here = seen(xyz)
@@ -107,7 +107,7 @@ def test_a_drop_in_front_of_a_wall_is_many_steps_from_everything() -> None:
 
 
 @pytest.mark.parametrize("points", [0, 1, 2, 5])
-def test_few_points_give_finite_numbers(points: int) -> None:
+def test_few_points_give_finite_numbers(points) -> None:
     around, far = seen(np.random.default_rng(0).normal(0, 5, (points, 3)).astype(np.float32))
     assert around.shape == (points, 8, 4)
     assert torch.isfinite(around).all()
@@ -128,9 +128,7 @@ def trained() -> RelativeOutDet:
     return trained_on_scenes(lambda: RelativeOutDet(learning_rate=1e-2), labelled)
 
 
-def test_it_learns_drops_and_is_blind_to_intensity(
-    trained: RelativeOutDet, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_it_learns_drops_and_is_blind_to_intensity(trained, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: hard_cases(largest=3000))
     onnx_file.export(trained, tmp_path / "model.onnx")
     derainer = Derainer(str(tmp_path / "model.onnx"))
@@ -141,7 +139,7 @@ def test_it_learns_drops_and_is_blind_to_intensity(
     np.testing.assert_array_equal(derainer(bright), called)
 
 
-def test_scans_of_a_batch_say_nothing_to_each_other(trained: RelativeOutDet) -> None:
+def test_scans_of_a_batch_say_nothing_to_each_other(trained) -> None:
     view = trained.spec.make_view(threads=1)
     scans = [labelled(1), labelled(2, drops=5), Scan.of(scene(40))]
     samples = [Sample(scan, view(scan), None) for scan in scans]
@@ -151,7 +149,7 @@ def test_scans_of_a_batch_say_nothing_to_each_other(trained: RelativeOutDet) -> 
     torch.testing.assert_close(together, torch.cat(alone))
 
 
-def test_it_takes_no_candidates(trained: RelativeOutDet) -> None:
+def test_it_takes_no_candidates(trained) -> None:
     """What it says of a point depends on all the others, so that none may be left out."""
     candidates = Candidates((Bound("range", most=20.0),))
     view = trained.spec.make_view()
@@ -168,7 +166,7 @@ def test_too_small_a_neighbourhood_is_refused() -> None:
         RelativeOutDet(neighbours=3)
 
 
-def test_a_training_of_one_cycle_goes_on_with_steps_of_as_many_scans_alone(tmp_path: Path) -> None:
+def test_a_training_of_one_cycle_goes_on_with_steps_of_as_many_scans_alone(tmp_path) -> None:
     scans = [labelled(seed) for seed in range(2)]
 
     def fit(batch_size: int, checkpoint: Path | None = None) -> lightning.Trainer:

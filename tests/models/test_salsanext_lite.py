@@ -1,7 +1,6 @@
 """The variant of SalsaNext that folds: it computes on images of any size, and really folds."""
 
 from collections import Counter
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -36,7 +35,7 @@ def image(height: int, width: int, channels: int = 5) -> Tensor:
 
 
 @pytest.mark.parametrize("width", [-2, 0])
-def test_a_width_of_nothing_is_refused(width: int) -> None:
+def test_a_width_of_nothing_is_refused(width) -> None:
     with pytest.raises(InputError, match=f"width: {width} is not positive"):
         SalsaNextLiteNetwork(width=width)
 
@@ -68,7 +67,7 @@ def optimised(path: Path, folder: Path) -> Counter[str]:
 
 
 @pytest.fixture
-def exported(random_salsanext_lite: SalsaNextLite, made_once: Callable[..., Path]) -> Path:
+def exported(random_salsanext_lite, made_once) -> Path:
     """The network in float32, as an ONNX file."""
     return made_once("salsanext_lite.onnx", partial(export, random_salsanext_lite))
 
@@ -78,7 +77,7 @@ def convolutions(model: SalsaNextLite) -> int:
 
 
 def test_the_exported_graph_has_its_convolutions_and_no_batch_norm(
-    random_salsanext_lite: SalsaNextLite, exported: Path, tmp_path: Path
+    random_salsanext_lite, exported, tmp_path
 ) -> None:
     found = operators(exported)
     assert found["Conv"] == convolutions(random_salsanext_lite)
@@ -90,10 +89,7 @@ def test_the_exported_graph_has_its_convolutions_and_no_batch_norm(
 
 
 def test_in_eight_bits_nothing_leaves_the_integers_between_image_and_scores(
-    random_salsanext_lite: SalsaNextLite,
-    exported: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    random_salsanext_lite, exported, tmp_path, monkeypatch
 ) -> None:
     scenes = [Scan.of(scene(3000, seed), f"scene {seed}") for seed in range(2)]
     monkeypatch.setattr(onnx_file, "_traced", lambda *_: onnx.load(exported))

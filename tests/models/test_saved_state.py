@@ -19,17 +19,17 @@ from derain.models.saved_state import matching_state
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
+def path(tmp_path) -> Path:
     return tmp_path / "last.ckpt"
 
 
-def test_a_sound_checkpoint_is_gone_on_from(path: Path) -> None:
+def test_a_sound_checkpoint_is_gone_on_from(path) -> None:
     path.write_bytes(trained())
     go_on(path)
 
 
 @pytest.mark.parametrize("name", HOSTILE)
-def test_a_hostile_checkpoint_is_refused_by_its_name(path: Path, name: str) -> None:
+def test_a_hostile_checkpoint_is_refused_by_its_name(path, name) -> None:
     path.write_bytes(hostile(name))
     with pytest.raises(InputError) as refusal:
         go_on(path)
@@ -68,12 +68,12 @@ def test_a_number_may_be_infinite_where_it_is_before_the_first_score() -> None:
     ],
     ids=str,
 )
-def test_what_is_of_another_kind_is_refused(found: Any, own: Any) -> None:
+def test_what_is_of_another_kind_is_refused(found, own) -> None:
     with pytest.raises(InputError, match=r"last\.ckpt: lr_schedulers"):
         taken(found, own)
 
 
-def test_a_checkpoint_of_an_earlier_version_is_read_with_current_names(tmp_path: Path) -> None:
+def test_a_checkpoint_of_an_earlier_version_is_read_with_current_names(tmp_path) -> None:
     spec = {"view": {"way_back": "vote"}}  # the key of a Spec stays
     earlier = {
         "hyper_parameters": {"grid": "wads", "way_back": "vote", "spec": spec},
@@ -88,7 +88,7 @@ def test_a_checkpoint_of_an_earlier_version_is_read_with_current_names(tmp_path:
     }
 
 
-def test_a_monitor_of_an_earlier_configuration_is_followed(tmp_path: Path) -> None:
+def test_a_monitor_of_an_earlier_configuration_is_followed(tmp_path) -> None:
     callback = BestCheckpoint(tmp_path, monitor="val/merit", mode="max")
     trainer = lightning.Trainer(accelerator="cpu", logger=False, enable_checkpointing=False)
     callback.setup(trainer, lightning.LightningModule(), "fit")

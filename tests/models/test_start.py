@@ -61,7 +61,7 @@ MODELS = {
 
 
 @pytest.mark.parametrize("kind", MODELS)
-def test_the_first_logits_are_those_of_the_start(kind: str, tmp_path: Path) -> None:
+def test_the_first_logits_are_those_of_the_start(kind, tmp_path) -> None:
     first, recipe = MODELS[kind]
     source = trained(first, FIRST, 0, tmp_path / "start.ckpt")
     student = started(recipe, tmp_path / "start.ckpt", "mine")
@@ -84,7 +84,7 @@ def test_the_first_logits_are_those_of_the_start(kind: str, tmp_path: Path) -> N
         assert student.hparams.get(argument) == recipe.hparams.get(argument)
 
 
-def test_the_record_says_what_it_began_from_and_all_that_both_have_seen(tmp_path: Path) -> None:
+def test_the_record_says_what_it_began_from_and_all_that_both_have_seen(tmp_path) -> None:
     source = trained(OutDet(neighbours=3), FIRST, 0, tmp_path / "one.ckpt")
     student = started(OutDet(), tmp_path / "one.ckpt", "one")
     (one,) = agree_on_task(student, data(OTHER, 10)).spec.training[STARTED_FROM]
@@ -100,7 +100,7 @@ def test_the_record_says_what_it_began_from_and_all_that_both_have_seen(tmp_path
     assert len(last.training["scans"]) == 9
 
 
-def test_a_student_that_is_read_back_is_as_it_was(tmp_path: Path) -> None:
+def test_a_student_that_is_read_back_is_as_it_was(tmp_path) -> None:
     trained(OutDet(neighbours=4, channels=("range",)), FIRST, 0, tmp_path / "start.ckpt")
     student = started(OutDet(learning_rate=0.02), tmp_path / "start.ckpt", "mine")
     again = trained(student, OTHER, 10, tmp_path / "student.ckpt")
@@ -109,7 +109,7 @@ def test_a_student_that_is_read_back_is_as_it_was(tmp_path: Path) -> None:
     assert again.spec == student.spec
 
 
-def test_it_starts_from_a_model_of_its_own_kind_alone(tmp_path: Path) -> None:
+def test_it_starts_from_a_model_of_its_own_kind_alone(tmp_path) -> None:
     trained(OutDet(neighbours=3), FIRST, 0, tmp_path / "start.ckpt")
     with pytest.raises(InputError, match="a model of outdet, from which salsanext cannot start"):
         started(SalsaNext(), tmp_path / "start.ckpt", "mine")

@@ -32,13 +32,13 @@ MakeModel = Callable[..., SupervisedModule]
 
 
 @pytest.fixture(params=["outdet", "salsanext"])
-def make(request: pytest.FixtureRequest, small_grid: dict) -> MakeModel:
+def make(request, small_grid) -> MakeModel:
     if request.param == "outdet":
         return OutDet
     return lambda **options: SalsaNext(grid=small_grid, width=4, **options)
 
 
-def test_the_rarer_class_counts_for_as_much_more_as_it_is_told(make: MakeModel) -> None:
+def test_the_rarer_class_counts_for_as_much_more_as_it_is_told(make) -> None:
     scans = [taught(seed) for seed in range(2)]
     weights = {}
     for balance in (0.0, 0.5, 1.0):
@@ -51,7 +51,7 @@ def test_the_rarer_class_counts_for_as_much_more_as_it_is_told(make: MakeModel) 
     assert torch.equal(weights[0.0], torch.ones(2))
 
 
-def test_what_is_not_known_moves_no_weight(make: MakeModel) -> None:
+def test_what_is_not_known_moves_no_weight(make) -> None:
     scan = taught(0)
     unknown = scan.label == 255
     losses = []

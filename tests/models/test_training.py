@@ -28,7 +28,6 @@ from derain.models.outdet import OutDet
 from derain.models.salsanext import SalsaNext
 from derain.sources.training_record import record_of_scans
 
-MakeTrainer = Callable[..., lightning.Trainer]
 RAIN = 3
 
 
@@ -37,7 +36,7 @@ def iou(predicted: NDArray[np.bool_], rain: NDArray[np.bool_]) -> float:
 
 
 @pytest.fixture
-def scenes(tmp_path: Path) -> Callable[..., Folder]:
+def scenes(tmp_path) -> Callable[..., Folder]:
     """Makes a data module of four small labelled scenes."""
     write_scenes(tmp_path, *4 * [300], name="{}.bin", rain=RAIN)
 
@@ -60,11 +59,7 @@ def differ(one: torch.nn.Module, other: torch.nn.Module) -> bool:
 
 @pytest.mark.parametrize("called", [False, True], ids=["nothing is called rain", "all is"])
 def test_without_rain_to_validate_on_the_best_epoch_is_that_of_the_least_loss(
-    make_trainer: MakeTrainer,
-    scenes: Callable[..., Folder],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    called: bool,
+    make_trainer, scenes, tmp_path, capsys, called
 ) -> None:
     write_labels(tmp_path / "3.label", np.zeros(300, int))
 
@@ -95,11 +90,7 @@ def networks() -> dict[str, Callable[[], DerainingModule]]:
     ("network", "workers"), [("outdet", 2), ("salsanext", 0), ("lisnownet", 0)]
 )
 def test_a_run_goes_on_from_its_last_checkpoint_as_if_it_had_not_stopped(
-    make_trainer: MakeTrainer,
-    scenes: Callable[..., Folder],
-    tmp_path: Path,
-    network: str,
-    workers: int,
+    make_trainer, scenes, tmp_path, network, workers
 ) -> None:
     # All that training draws: order, every augmentation, dropout.
     changed = Augmentation(mirror_probability=0.5, dropping_probability=0.5)
@@ -128,7 +119,7 @@ def test_a_run_goes_on_from_its_last_checkpoint_as_if_it_had_not_stopped(
 
 
 def test_a_run_that_stopped_in_the_middle_of_an_epoch_does_not_start_from_the_first(
-    make_trainer: MakeTrainer, scenes: Callable[..., Folder], tmp_path: Path
+    make_trainer, scenes, tmp_path
 ) -> None:
     class Seen(lightning.Callback):
         def __init__(self) -> None:
@@ -152,7 +143,7 @@ def test_a_run_that_stopped_in_the_middle_of_an_epoch_does_not_start_from_the_fi
 
 
 def test_a_checkpoint_of_a_run_is_a_model_and_has_the_normalisation_of_a_test(
-    make_trainer: MakeTrainer, scenes: Callable[..., Folder], tmp_path: Path
+    make_trainer, scenes, tmp_path
 ) -> None:
     model = OutDet(neighbours=6)
     trainer = make_trainer(epochs=1)
@@ -171,7 +162,7 @@ def test_a_checkpoint_of_a_run_is_a_model_and_has_the_normalisation_of_a_test(
 
 
 def test_a_network_of_candidates_learns_from_them_and_judges_them_alone(
-    make_trainer: MakeTrainer, scenes: Callable[..., Folder], tmp_path: Path
+    make_trainer, scenes, tmp_path
 ) -> None:
     data, trainer = scenes(batch_size=2), make_trainer(epochs=2)
     model = OutDet(candidates=0.9)
@@ -196,9 +187,7 @@ def test_a_network_of_candidates_learns_from_them_and_judges_them_alone(
     assert load_model(tmp_path / "run.ckpt").spec == model.spec
 
 
-def test_clean_data_teach_a_network_of_labels_nothing(
-    make_trainer: MakeTrainer, tmp_path: Path
-) -> None:
+def test_clean_data_teach_a_network_of_labels_nothing(make_trainer, tmp_path) -> None:
     scene(300).tofile(tmp_path / "0.bin")
     write_labels(tmp_path / "0.label", np.zeros(300, np.int64))
     clean = Folder(str(tmp_path), "semantickitti", train=["0.bin"], validation=["0.bin"])
@@ -208,10 +197,7 @@ def test_clean_data_teach_a_network_of_labels_nothing(
 
 @pytest.mark.parametrize("content", [{}, {"hyper_parameters": {"lr": 1}}], ids=str)
 def test_a_run_does_not_start_from_a_checkpoint_of_something_else(
-    make_trainer: MakeTrainer,
-    scenes: Callable[..., Folder],
-    tmp_path: Path,
-    content: dict[str, Any],
+    make_trainer, scenes, tmp_path, content
 ) -> None:
     foreign = {"pytorch-lightning_version": lightning.__version__, "state_dict": {}, **content}
     torch.save(foreign, tmp_path / "foreign.ckpt")
@@ -219,8 +205,6 @@ def test_a_run_does_not_start_from_a_checkpoint_of_something_else(
         make_trainer(epochs=1).test(OutDet(), scenes(), ckpt_path=tmp_path / "foreign.ckpt")
 
 
-def test_an_untrained_model_is_not_tested(
-    make_trainer: MakeTrainer, scenes: Callable[..., Folder]
-) -> None:
+def test_an_untrained_model_is_not_tested(make_trainer, scenes) -> None:
     with pytest.raises(InputError, match="has not been trained"):
         make_trainer(epochs=1).test(OutDet(), scenes())

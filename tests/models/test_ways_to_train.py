@@ -29,7 +29,6 @@ from derain.scan import Scan
 
 from .two_processes import GRID, NETWORKS
 
-MakeTrainer = Callable[..., lightning.Trainer]
 SNOW = 110
 SCANS = 4
 TRAINED, VALIDATED, TESTED = range(3), (3,), (2, 3)
@@ -37,7 +36,7 @@ LOADING = Loading(batch_size=2)
 
 
 @pytest.fixture(params=NETWORKS)
-def network(request: pytest.FixtureRequest) -> Callable[[], DerainingModule]:
+def network(request) -> Callable[[], DerainingModule]:
     """Makes a network, the same one every time."""
 
     def make() -> DerainingModule:
@@ -48,7 +47,7 @@ def network(request: pytest.FixtureRequest) -> Callable[[], DerainingModule]:
 
 
 @pytest.fixture
-def files(tmp_path: Path) -> Folder:
+def files(tmp_path) -> Folder:
     for number in range(SCANS):
         scene(300, seed=number).tofile(tmp_path / f"{number}.bin")
         write_labels(tmp_path / f"{number}.label", SNOW * (np.arange(300) % 7 == 0))
@@ -57,7 +56,7 @@ def files(tmp_path: Path) -> Folder:
 
 
 @pytest.fixture
-def scans(files: Folder) -> list[Scan]:
+def scans(files) -> list[Scan]:
     """What the files hold."""
     label = SNOW * (np.arange(300) % 7 == 0)
     paths = [files.root / f"{number}.bin" for number in range(SCANS)]
@@ -65,7 +64,7 @@ def scans(files: Folder) -> list[Scan]:
 
 
 @pytest.fixture
-def memory(scans: list[Scan]) -> InMemory:
+def memory(scans) -> InMemory:
     train, validation, test = ([scans[n] for n in part] for part in (TRAINED, VALIDATED, TESTED))
     return InMemory(train, validation, test, card="wads", loading=LOADING)
 
@@ -77,10 +76,7 @@ def assert_same(one: Mapping[str, Tensor], other: Mapping[str, Tensor]) -> None:
 
 
 def test_files_memory_and_plain_loaders_train_the_same_network(
-    make_trainer: MakeTrainer,
-    files: Folder,
-    memory: InMemory,
-    network: Callable[[], DerainingModule],
+    make_trainer, files, memory, network
 ) -> None:
     of_files, of_memory, of_loaders = network(), network(), network()
     expected = make_trainer(epochs=2)
@@ -102,11 +98,7 @@ def test_files_memory_and_plain_loaders_train_the_same_network(
 
 
 def test_files_memory_and_plain_loaders_are_measured_alike(
-    make_trainer: MakeTrainer,
-    files: Folder,
-    memory: InMemory,
-    outdet: Callable[..., OutDet],
-    tmp_path: Path,
+    make_trainer, files, memory, outdet, tmp_path
 ) -> None:
     model = outdet()
     scores, probabilities = [], []
@@ -125,9 +117,7 @@ def test_files_memory_and_plain_loaders_are_measured_alike(
             np.testing.assert_array_equal(one, other)
 
 
-def test_batches_that_were_made_before_are_trained_on_too(
-    make_trainer: MakeTrainer, memory: InMemory, network: Callable[[], DerainingModule]
-) -> None:
+def test_batches_that_were_made_before_are_trained_on_too(make_trainer, memory, network) -> None:
     model = network()
     task = agree_on_task(model, memory)
     made = [
@@ -145,7 +135,7 @@ def test_batches_that_were_made_before_are_trained_on_too(
 
 
 def test_a_model_that_was_told_nothing_of_its_batches_says_what_it_lacks(
-    make_trainer: MakeTrainer, memory: InMemory
+    make_trainer, memory
 ) -> None:
     loader = scan_loader(memory.source("train"), "train", agree_on_task(OutDet(), memory))
     with pytest.raises(InputError, match=r"Call .*agree_on_task\(model, data\)"):
@@ -163,16 +153,12 @@ def without_rain(memory: InMemory, *parts: str) -> InMemory:
     return InMemory(*scans.values(), card="wads", loading=LOADING)
 
 
-def test_training_on_scans_without_rain_is_refused(
-    make_trainer: MakeTrainer, memory: InMemory
-) -> None:
+def test_training_on_scans_without_rain_is_refused(make_trainer, memory) -> None:
     with pytest.raises(InputError, match=r"no point of these scans is falling-snow .*WADS"):
         make_trainer(epochs=1).fit(OutDet(), without_rain(memory, "train"))
 
 
-def test_measuring_on_scans_without_rain_is_warned_of_once(
-    make_trainer: MakeTrainer, memory: InMemory, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_measuring_on_scans_without_rain_is_warned_of_once(make_trainer, memory, capsys) -> None:
     data, model = without_rain(memory, "validation", "test"), OutDet()
     warning = "no point of these scans is falling-snow"
     make_trainer(epochs=2, callbacks=[ScanCheck()]).fit(model, data)
@@ -185,12 +171,7 @@ def test_measuring_on_scans_without_rain_is_warned_of_once(
         assert warning not in capsys.readouterr().err
 
 
-def test_callbacks_go_without_a_data_module(
-    make_trainer: MakeTrainer,
-    memory: InMemory,
-    capsys: pytest.CaptureFixture[str],
-    tmp_path: Path,
-) -> None:
+def test_callbacks_go_without_a_data_module(make_trainer, memory, capsys, tmp_path) -> None:
     model = OutDet()
     task = agree_on_task(model, memory)
     loaders = {
@@ -203,9 +184,7 @@ def test_callbacks_go_without_a_data_module(
     assert "WADS, 2 scans" in capsys.readouterr().out
 
 
-def test_a_run_of_loaders_goes_on_from_its_checkpoint(
-    make_trainer: MakeTrainer, memory: InMemory, tmp_path: Path
-) -> None:
+def test_a_run_of_loaders_goes_on_from_its_checkpoint(make_trainer, memory, tmp_path) -> None:
     def fit(epochs: int, checkpoint: Path | None = None, rows: int = 16) -> DerainingModule:
         lightning.seed_everything(0)
         model = LiSnowNet(grid={**GRID, "rows": rows}, width=2)
@@ -223,7 +202,7 @@ def test_a_run_of_loaders_goes_on_from_its_checkpoint(
 
 
 def test_a_run_of_loaders_does_not_go_on_with_other_candidates(
-    make_trainer: MakeTrainer, scans: list[Scan], tmp_path: Path
+    make_trainer, scans, tmp_path
 ) -> None:
     near = [scan.with_label(np.where(scan.range < 8, SNOW, 0)) for scan in scans]
     memory = InMemory(near, near, near, card="wads", loading=LOADING)

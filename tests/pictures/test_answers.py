@@ -33,7 +33,7 @@ def heights(figure: Figure, panel: int, answer: int) -> list[float]:
     return [bar.get_height() for bar in bars if bar.get_facecolor() == colour]
 
 
-def test_the_bars_of_a_teacher_are_its_shares_by_scan(scan: Scan) -> None:
+def test_the_bars_of_a_teacher_are_its_shares_by_scan(scan) -> None:
     counted = [Answers.of(scan, CARD), Answers.of(scan.take(np.arange(0, 4000, 8)), CARD)]
     scans = [AnswersOfScan("a", False, counted[0]), AnswersOfScan("b", True, counted[1])]
     figure = teacher_figure(scans, "a teacher")
@@ -43,7 +43,7 @@ def test_the_bars_of_a_teacher_are_its_shares_by_scan(scan: Scan) -> None:
     assert not any(text.get_text() for text in teacher_figure(scans[:1], "").axes[0].texts)
 
 
-def test_the_lines_of_what_is_removed_are_its_shares_by_range(scan: Scan) -> None:
+def test_the_lines_of_what_is_removed_are_its_shares_by_range(scan) -> None:
     called = np.arange(4000) % 3 == 0
     figure = removed_figure(Answers.of(scan, CARD, called), "removed")
     drawn = {patch.get_label(): patch for patch in figure.axes[0].patches}
@@ -58,7 +58,7 @@ def test_the_lines_of_what_is_removed_are_its_shares_by_range(scan: Scan) -> Non
             assert rain[band] == pytest.approx((scan.label[inside] == 1).mean())
 
 
-def test_a_student_beside_its_teacher_is_drawn_point_by_point(scan: Scan) -> None:
+def test_a_student_beside_its_teacher_is_drawn_point_by_point(scan) -> None:
     called = np.arange(4000) % 3 == 0
     figure = answers_figure(scan, CARD, called, "beside")
     rain, unknown = scan.label == 1, scan.label == 255

@@ -3,7 +3,6 @@
 import sys
 import warnings
 from collections import Counter
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -67,9 +66,7 @@ def judged() -> tuple[Scan, np.ndarray, np.ndarray]:
     return scan, predicted & scan.valid, rain
 
 
-def test_the_panels_of_a_judgement_count_what_became_of_the_points(
-    judged: tuple[Scan, np.ndarray, np.ndarray],
-) -> None:
+def test_the_panels_of_a_judgement_count_what_became_of_the_points(judged) -> None:
     scan, predicted, rain = judged
     shown = panels(judgement_figure(scan, predicted, rain, "a scan"))
     assert list(shown) == ["input: intensity", "truth", "prediction", "error"]
@@ -82,9 +79,7 @@ def test_the_panels_of_a_judgement_count_what_became_of_the_points(
     assert [len(places(axes)) for axes in shown["input: intensity"]] == [196] * 2
 
 
-def test_each_method_shows_what_it_removes_leaves_and_loses(
-    judged: tuple[Scan, np.ndarray, np.ndarray],
-) -> None:
+def test_each_method_shows_what_it_removes_leaves_and_loses(judged) -> None:
     scan, first, rain = judged
     second = ~first & scan.valid
     figure = comparison_figure(scan, {"first": first, "second": second}, rain, "a scan")
@@ -156,7 +151,7 @@ HARD_TO_DRAW = ("empty", "nothing valid", "near and far together", "on a line", 
 
 
 @pytest.mark.parametrize("name", HARD_TO_DRAW)
-def test_before_and_after_differ_by_what_was_found_without_a_warning(name: str) -> None:
+def test_before_and_after_differ_by_what_was_found_without_a_warning(name) -> None:
     scan = dict(hard_cases(200))[name]
     found = scan.valid & (np.arange(len(scan)) % 2 == 0)
     with warnings.catch_warnings():
@@ -178,9 +173,7 @@ def test_before_and_after_differ_by_what_was_found_without_a_warning(name: str) 
         assert ((low <= at) & (at <= high)).all(axis=1).any() == bool(len(at))
 
 
-def test_a_picture_is_saved_as_png_and_nothing_stays_where_it_cannot_be(
-    tmp_path: Path, judged: tuple[Scan, np.ndarray, np.ndarray]
-) -> None:
+def test_a_picture_is_saved_as_png_and_nothing_stays_where_it_cannot_be(tmp_path, judged) -> None:
     scan, predicted, _ = judged
     path = tmp_path / "new" / "picture.png"
     save(before_after_figure(scan, predicted, "a scan"), path)
@@ -195,7 +188,7 @@ def test_a_picture_is_saved_as_png_and_nothing_stays_where_it_cannot_be(
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="a variable tells where a screen is")
-def test_without_a_screen_a_window_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_screen_a_window_is_refused(monkeypatch) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     with pytest.raises(InputError, match="there is no screen to open it on"):

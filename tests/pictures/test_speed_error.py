@@ -28,7 +28,7 @@ standings = st.lists(
 
 
 @given(standings)
-def test_the_pareto_front_is_what_no_other_method_surpasses(methods: list[Standing]) -> None:
+def test_the_pareto_front_is_what_no_other_method_surpasses(methods) -> None:
     def surpasses(a: Standing, b: Standing) -> bool:
         no_worse = a.error <= b.error and a.milliseconds <= b.milliseconds
         return no_worse and (a.error, a.milliseconds) != (b.error, b.milliseconds)
@@ -64,7 +64,7 @@ def drawn(methods: list[Standing]) -> tuple[Figure, NDArray[np.float64], list[Bb
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_labels_cover_neither_each_other_nor_a_marker(seed: int) -> None:
+def test_labels_cover_neither_each_other_nor_a_marker(seed) -> None:
     methods = crowd(seed)
     figure, places, boxes = drawn(methods)
     assert [text.get_text() for text in figure.axes[0].texts] == [each.label for each in methods]

@@ -104,9 +104,7 @@ def test_a_gap_is_told_and_bridged_where_the_scans_still_meet(driven) -> None:
         (Scan.of(np.full((100, 3), 10.0)), "has only 1 surfaces in reach"),
     ],
 )
-def test_what_cannot_be_registered_is_told_and_the_motion_goes_on(
-    driven, other: Scan, reason: str
-) -> None:
+def test_what_cannot_be_registered_is_told_and_the_motion_goes_on(driven, other, reason) -> None:
     scans, _ = driven
     odometry = Odometry()
     found = [odometry.register(scan) for scan in (scans[0], scans[1], other, scans[2], scans[3])]
@@ -140,7 +138,7 @@ def test_a_bare_road_that_shows_no_way_along_it_is_not_trusted() -> None:
 
 
 @pytest.mark.parametrize("degrees", [0, 1e-9, 1e-3, 1, 90, 179.999, 180])
-def test_a_turn_is_told_to_the_last_digits(degrees: float) -> None:
+def test_a_turn_is_told_to_the_last_digits(degrees) -> None:
     assert turn_of(motion(5, 5, yaw=degrees)) == pytest.approx(degrees, abs=1e-10)
 
 
@@ -150,7 +148,7 @@ def registered(folder: Path, number: int, every: int = 1) -> list[Registration]:
     return [odometry.register(read_scan(path)) for path in paths]
 
 
-def test_snowykitti_stands(shared: Path) -> None:
+def test_snowykitti_stands(shared) -> None:
     found = registered(shared / "data/snowykitti/velodyne", 5)
     assert len(found) == 5
     assert all(each.trusted for each in found)
@@ -158,7 +156,7 @@ def test_snowykitti_stands(shared: Path) -> None:
     assert max(each.turn for each in found) < 0.1
 
 
-def test_the_wads_drive_goes_on_evenly(shared: Path) -> None:
+def test_the_wads_drive_goes_on_evenly(shared) -> None:
     folder = shared / "data/wads/drive/velodyne"
     found, skipping = registered(folder, 9), registered(folder, 9, every=2)
     assert len(found) == 9
@@ -181,7 +179,7 @@ GOOD = Fit(np.eye(4), converged=True, residual=0.03, matched=0.9, facing=0.05)
         ({"converged": False}, "did not converge"),
     ],
 )
-def test_each_fault_is_told(fault: dict[str, float], reason: str) -> None:
+def test_each_fault_is_told(fault, reason) -> None:
     assert reason in Trust().misfit(replace(GOOD, **fault))
 
 

@@ -2,7 +2,6 @@
 
 import pickle
 from collections.abc import Iterable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -77,7 +76,7 @@ def recall_and_false(judgement: Judgement) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("posed", [True, False])
-def test_it_finds_drops_and_leaves_walls(posed: bool) -> None:
+def test_it_finds_drops_and_leaves_walls(posed) -> None:
     answers = judged(drive(posed=posed))
     assert [answer.frame.number for answer in answers if answer.frame] == [0, 1, 2, 3]
     for answer in answers:
@@ -129,7 +128,7 @@ def test_a_registration_that_fails_is_told_of() -> None:
     assert any("its pose is not known" in detail for detail in details)
 
 
-def test_damaged_records_are_done_without(tmp_path: Path) -> None:
+def test_damaged_records_are_done_without(tmp_path) -> None:
     for number, frame in enumerate(drive(3)):
         write_scan(tmp_path / f"yard/scan_{number}.pcd", frame.scan)
     frames = named_frames([tmp_path / "yard"])
@@ -181,13 +180,13 @@ def test_hard_cases_are_answered() -> None:
         ({"reach": 3}, "it has no parameter reach. It has before, after, sure."),
     ],
 )
-def test_wrong_parameters_are_refused(parameters: dict[str, object], told: str) -> None:
+def test_wrong_parameters_are_refused(parameters, told) -> None:
     with pytest.raises(InputError) as refused:
         load_method("persistence", parameters)
     assert told in str(refused.value)
 
 
-def test_real_snow_is_found_by_free_space(shared: Path) -> None:
+def test_real_snow_is_found_by_free_space(shared) -> None:
     from derain.cards.card import load_card
     from derain.sources.reader import FrameReader
     from derain.views.morton import first_rows

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,7 +28,7 @@ def scans() -> list[Scan]:
 
 
 @pytest.fixture
-def drive(scans: list[Scan]) -> Frames:
+def drive(scans) -> Frames:
     return Frames.of_scans(scans, "drive")
 
 
@@ -41,7 +40,7 @@ def lines(ahead: list[float]) -> str:
     return "".join(f"1 0 0 {x} 0 1 0 0 0 0 1 0\n" for x in ahead)
 
 
-def test_odometry_gives_poses_and_tells_of_each(drive: Frames) -> None:
+def test_odometry_gives_poses_and_tells_of_each(drive) -> None:
     told: list[tuple[Frame, Registration]] = []
     posed = with_poses(drive, "odometry", on_registration=lambda *each: told.append(each))
     assert [frame.key for frame, _ in told] == [frame.key for frame in drive]
@@ -52,7 +51,7 @@ def test_odometry_gives_poses_and_tells_of_each(drive: Frames) -> None:
     assert all(later.follows(earlier) for earlier, later in pairwise(posed))
 
 
-def test_each_recording_starts_at_the_identity(drive: Frames) -> None:
+def test_each_recording_starts_at_the_identity(drive) -> None:
     assert all((frame.pose == np.eye(4)).all() for frame in with_poses(drive, "standing"))
     twice = [*drive, *(replace(frame, sequence="again") for frame in drive)]
     posed = with_poses(twice, "odometry")
@@ -68,9 +67,7 @@ class Broken(MemoryFrame):
 
 
 @pytest.mark.parametrize("unread", [True, False])
-def test_no_window_reaches_over_a_scan_that_cannot_be_registered(
-    drive: Frames, unread: bool
-) -> None:
+def test_no_window_reaches_over_a_scan_that_cannot_be_registered(drive, unread) -> None:
     blind = replace(drive[1], scan=Scan.of(np.zeros((0, 3))))
     bad = Broken(**vars(blind)) if unread else blind
     reasons: list[str] = []
@@ -87,7 +84,7 @@ def test_no_window_reaches_over_a_scan_that_cannot_be_registered(
     )
 
 
-def test_a_scan_taken_before_the_one_that_it_follows_is_not_trusted(drive: Frames) -> None:
+def test_a_scan_taken_before_the_one_that_it_follows_is_not_trusted(drive) -> None:
     odometry = FrameOdometry()
     times = (0.0, 0.1, 0.1, 0.05)
     found = [
@@ -98,7 +95,7 @@ def test_a_scan_taken_before_the_one_that_it_follows_is_not_trusted(drive: Frame
     assert found[2].reason == ("it was taken at 0.100 s, the scan before at 0.100 s: out of order")
 
 
-def test_poses_of_a_file_go_line_by_line_or_by_number(drive: Frames, tmp_path: Path) -> None:
+def test_poses_of_a_file_go_line_by_line_or_by_number(drive, tmp_path) -> None:
     path = tmp_path / "mine.txt"
     path.write_text(lines([0, 1, 2, 3]))
     assert x_of(with_poses(drive, path)) == [0, 1, 2, 3]
@@ -110,7 +107,7 @@ def test_poses_of_a_file_go_line_by_line_or_by_number(drive: Frames, tmp_path: P
     assert x_of(with_poses(some, path)) == [5, 6, 7, 8]
 
 
-def test_poses_of_a_file_go_by_time_where_both_have_one(drive: Frames, tmp_path: Path) -> None:
+def test_poses_of_a_file_go_by_time_where_both_have_one(drive, tmp_path) -> None:
     path = tmp_path / "mine.tum"
     path.write_text("0.95 0 0 0 0 0 0 1\n1.45 5 0 0 0 0 0 1\n")
     timed = [replace(frame, seconds=1 + frame.number / 10) for frame in drive]
@@ -119,7 +116,7 @@ def test_poses_of_a_file_go_by_time_where_both_have_one(drive: Frames, tmp_path:
     assert x_of(with_poses(drive, path)) == [0, 1, 2, 3]
 
 
-def test_a_folder_has_a_file_for_each_recording(drive: Frames, tmp_path: Path) -> None:
+def test_a_folder_has_a_file_for_each_recording(drive, tmp_path) -> None:
     both = [*drive, *Frames.of_scans([drive[0].read()], "other")]
     with pytest.raises(InputError, match=r"drive\.txt: there is no such file"):
         with_poses(both, tmp_path)
@@ -131,7 +128,7 @@ def test_a_folder_has_a_file_for_each_recording(drive: Frames, tmp_path: Path) -
 
 
 @pytest.mark.parametrize("count", [0, 3, 5])
-def test_poses_of_another_length_are_refused(scans: list[Scan], tmp_path: Path, count: int) -> None:
+def test_poses_of_another_length_are_refused(scans, tmp_path, count) -> None:
     named = Frames(
         MemoryFrame(key=f"{n}", number=n, scan=replace(scan, name=f"scan_{n}"))
         for n, scan in enumerate(scans)
@@ -142,9 +139,7 @@ def test_poses_of_another_length_are_refused(scans: list[Scan], tmp_path: Path, 
         with_poses(named, path)
 
 
-def test_without_a_word_poses_beside_the_scans_count_and_odometry_fills_in(
-    drive: Frames, tmp_path: Path
-) -> None:
+def test_without_a_word_poses_beside_the_scans_count_and_odometry_fills_in(drive, tmp_path) -> None:
     for name in ("known", "unknown"):
         for number, frame in enumerate(drive[:2]):
             write_scan(tmp_path / name / f"{number:06d}.pcd", frame.read())
@@ -159,23 +154,21 @@ def test_without_a_word_poses_beside_the_scans_count_and_odometry_fills_in(
     assert told == [str(tmp_path / f"unknown/00000{number}.pcd") for number in range(2)]
 
 
-def test_a_record_that_is_damaged_is_told_and_not_passed_over(
-    drive: Frames, tmp_path: Path
-) -> None:
+def test_a_record_that_is_damaged_is_told_and_not_passed_over(drive, tmp_path) -> None:
     write_scan(tmp_path / "a/0.pcd", drive[0].read())
     (tmp_path / "a/poses.txt").write_text("damaged")
     with pytest.raises(InputError, match="line 1 is not 12 numbers"):
         with_poses(named_frames([tmp_path / "a"]))
 
 
-def test_gaps_of_one_part_do_not_close_up_to_the_next(drive: Frames) -> None:
+def test_gaps_of_one_part_do_not_close_up_to_the_next(drive) -> None:
     blind = [replace(frame, scan=Scan.of(np.zeros((0, 3)))) for frame in drive[:3]]
     later = replace(drive[3], number=5)  # two scans of the sequence are missing before it
     posed = with_poses([*blind, later], "odometry")
     assert not any(after.follows(before) for before, after in pairwise(posed))
 
 
-def test_poses_that_go_by_lines_ask_for_no_times(drive: Frames, tmp_path: Path) -> None:
+def test_poses_that_go_by_lines_ask_for_no_times(drive, tmp_path) -> None:
     for number, frame in enumerate(drive[:2]):
         write_scan(tmp_path / f"a/{number}.pcd", frame.read())
     (tmp_path / "a/times.txt").write_text("soon")

@@ -60,7 +60,7 @@ def test_where_there_are_no_rays_nothing_is_said() -> None:
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_it_is_what_asking_every_ray_says(seed: int) -> None:
+def test_it_is_what_asking_every_ray_says(seed) -> None:
     generator = np.random.default_rng(seed)
     clouds = [
         wall(generator.uniform(5, 30), 6, 8) * generator.uniform(0.97, 1.03, (48, 1))

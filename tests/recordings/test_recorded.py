@@ -59,9 +59,7 @@ def judged(
 
 @pytest.mark.parametrize("posed", [True, False], ids=["poses", "odometry"])
 @pytest.mark.parametrize(("past", "delay"), [(1, 0), (1, 1), (0, 1)])
-def test_drops_become_likelier_and_walls_less_likely(
-    model: Derainer, posed: bool, past: int, delay: int
-) -> None:
+def test_drops_become_likelier_and_walls_less_likely(model, posed, past, delay) -> None:
     for judgement in judged(model, drive(posed=posed), past, delay)[1:-1]:
         alone, drop = model.judge(judgement.scan).probability, is_drop(judgement.scan)
         assert (judgement.probability[alone < 0.01] == alone[alone < 0.01]).all()
@@ -69,7 +67,7 @@ def test_drops_become_likelier_and_walls_less_likely(
         assert (judgement.probability[~drop & (alone > 0.01)] < 0.3).mean() > 0.8
 
 
-def test_without_anything_to_go_by_it_is_the_model(model: Derainer) -> None:
+def test_without_anything_to_go_by_it_is_the_model(model) -> None:
     frames = drive(3)
     turned = frames[1].sensor_to_world @ np.diag([-1.0, -1, 1, 1])
     turned[:2, 3] += 30
@@ -85,7 +83,7 @@ def test_without_anything_to_go_by_it_is_the_model(model: Derainer) -> None:
 
 
 def test_a_scan_that_is_there_twice_is_reported_and_one_of_which_nothing_is_known_is_not(
-    model: Derainer,
+    model,
 ) -> None:
     first, second = (replace(frame, sensor_to_world=None) for frame in drive(2))
     elsewhere = replace(second, scan=replace(second.scan, xyz=first.scan.xyz[::-1] * 7))
@@ -98,9 +96,7 @@ def test_a_scan_that_is_there_twice_is_reported_and_one_of_which_nothing_is_know
 
 @pytest.mark.parametrize("wrong", ["unreadable", "empty", "nothing but NaN", "makes it fail"])
 @pytest.mark.parametrize("posed", [True, False], ids=["poses", "odometry"])
-def test_scans_beside_one_that_fails_are_judged_without_it(
-    model: Derainer, posed: bool, wrong: str
-) -> None:
+def test_scans_beside_one_that_fails_are_judged_without_it(model, posed, wrong) -> None:
     first, beside, last = drive(3, posed=posed)
     broken = {
         "unreadable": Unreadable(key=beside.key, number=1, scan=beside.scan),
@@ -123,7 +119,7 @@ def test_scans_beside_one_that_fails_are_judged_without_it(
         np.testing.assert_array_equal(answers[number].probability, alone)
 
 
-def test_a_scan_that_fails_is_named_once_to_those_beside_it(model: Derainer) -> None:
+def test_a_scan_that_fails_is_named_once_to_those_beside_it(model) -> None:
     frames = drive(4)
     frames[1] = replace(frames[1], scan=replace(frames[1].scan, name=FAILS))
     failures = Failures(lambda error: None)
@@ -139,7 +135,7 @@ def test_where_no_ray_is_near_nothing_is_added() -> None:
     assert ending < 0 < through
 
 
-def test_scans_that_are_no_longer_seen_are_let_go(model: Derainer) -> None:
+def test_scans_that_are_no_longer_seen_are_let_go(model) -> None:
     method, judged_scans = RecordedDerainer(model, past=1, delay=1), []
     for frame in drive(5):
         if (judgement := method.push(frame)) is not None:

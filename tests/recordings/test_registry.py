@@ -10,7 +10,7 @@ from derain.recordings.recording_method import METHODS
 
 
 @pytest.fixture
-def between(monkeypatch: pytest.MonkeyPatch) -> None:
+def between(monkeypatch) -> None:
     """Enters the method of these tests."""
     monkeypatch.setattr(METHODS, "_members", {**METHODS, "between": Between})
 

@@ -20,18 +20,18 @@ SETUPTOOLS = PYPROJECT["tool"]["setuptools"]
 
 
 @pytest.fixture(scope="module")
-def distributions(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+def distributions(tmp_path_factory) -> tuple[Path, Path]:
     """The wheel and the source distribution, which has built the same wheel."""
     wheel, sdist = build(tmp_path_factory.mktemp("dist"))
     return wheel, sdist
 
 
 @pytest.fixture(scope="module")
-def wheel(distributions: tuple[Path, Path]) -> Path:
+def wheel(distributions) -> Path:
     return distributions[0]
 
 
-def test_their_names_tell_the_one_version(distributions: tuple[Path, Path]) -> None:
+def test_their_names_tell_the_one_version(distributions) -> None:
     wheel, sdist = distributions
     assert wheel.name == f"derain-{__version__}-py3-none-any.whl"
     assert sdist.name == f"derain-{__version__}.tar.gz"
@@ -43,7 +43,7 @@ def test_the_citation_names_the_version_and_the_address_of_pyproject() -> None:
     assert citation["repository-code"] == PYPROJECT["project"]["urls"]["Repository"]
 
 
-def test_the_wheel_holds_every_file_of_the_packages_and_no_other(wheel: Path) -> None:
+def test_the_wheel_holds_every_file_of_the_packages_and_no_other(wheel) -> None:
     listed = subprocess.run(["git", "ls-files"], cwd=REPOSITORY, capture_output=True, text=True)
     folders = {"derain": "derain", **SETUPTOOLS["package-dir"]}
     expected = set()
@@ -56,15 +56,13 @@ def test_the_wheel_holds_every_file_of_the_packages_and_no_other(wheel: Path) ->
     assert {"derain/py.typed", "derain/default/model.onnx", "derain/cards/wads.yaml"} < held
 
 
-def test_the_source_distribution_holds_what_its_readers_want(
-    distributions: tuple[Path, Path],
-) -> None:
+def test_the_source_distribution_holds_what_its_readers_want(distributions) -> None:
     with tarfile.open(distributions[1]) as archive:
         held = {name.partition("/")[2] for name in archive.getnames()}
     assert held >= {"README.md", "LICENSE", "CHANGELOG.md", "CITATION.cff", "SECURITY.md"}
 
 
-def test_the_wheel_alone_runs_away_from_the_repository(wheel: Path, tmp_path: Path) -> None:
+def test_the_wheel_alone_runs_away_from_the_repository(wheel, tmp_path) -> None:
     with ZipFile(wheel) as archive:
         archive.extractall(tmp_path / "installed")
     code = "import derain, sys; from derain.cli.main import main; print(derain.__file__); main()"
@@ -93,7 +91,7 @@ def test_a_file_that_the_source_distribution_lacks_is_named() -> None:
 
 
 @pytest.mark.parametrize("tag", ["v0.0.0", __version__, f"v{__version__}.1", ""])
-def test_a_tag_of_another_version_is_refused(tag: str) -> None:
+def test_a_tag_of_another_version_is_refused(tag) -> None:
     refuse_other_tag(f"v{__version__}")
     with pytest.raises(InputError, match=f"v{__version__}"):
         refuse_other_tag(tag)

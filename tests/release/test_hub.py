@@ -10,20 +10,20 @@ from release.hub import METRICS, page, write
 
 
 @pytest.fixture(scope="module")
-def hub(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def hub(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("hub") / "hub"
     write(folder)
     return folder
 
 
-def test_the_folder_holds_model_and_card(hub: Path) -> None:
+def test_the_folder_holds_model_and_card(hub) -> None:
     assert {file.name for file in hub.iterdir()} == {
         *("README.md", "model.onnx", "model.ckpt", "card.yaml")
     }
     assert (hub / "model.onnx").read_bytes() == default_model().read_bytes()
 
 
-def test_the_hub_reads_every_score_of_the_card(hub: Path) -> None:
+def test_the_hub_reads_every_score_of_the_card(hub) -> None:
     data = huggingface_hub.ModelCard.load(hub / "README.md").data
     card = model_card()
     assert (data.license, data.library_name) == (card.licence.lower(), "derain")

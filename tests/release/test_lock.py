@@ -31,13 +31,11 @@ def wanted() -> Iterator[Requirement]:
 
 
 @pytest.mark.parametrize("requirement", [*wanted()], ids=lambda requirement: requirement.name)
-def test_what_is_asked_for_has_a_version_that_is_admitted(
-    requirement: Requirement, lock: dict[str, str]
-) -> None:
+def test_what_is_asked_for_has_a_version_that_is_admitted(requirement, lock) -> None:
     assert lock[canonicalize_name(requirement.name)] in requirement.specifier
 
 
-def test_there_is_one_build_of_torch_and_no_library_of_cuda(lock: dict[str, str]) -> None:
+def test_there_is_one_build_of_torch_and_no_library_of_cuda(lock) -> None:
     assert "torch" in lock
     assert not [version for version in lock.values() if "+" in version]
     assert not [name for name in lock if name.startswith(("nvidia", "cuda", "triton"))]

@@ -54,7 +54,7 @@ for command in json.loads(sys.argv[1]):
 
 
 @pytest.fixture
-def plain(tmp_path: Path) -> Any:
+def plain(tmp_path) -> Any:
     """Runs code in a process of a plain installation, and gives what it prints."""
     folder = tmp_path / "plain"
     folder.mkdir()
@@ -75,7 +75,7 @@ def plain(tmp_path: Path) -> Any:
 
 
 @pytest.fixture
-def scan(tmp_path: Path) -> Path:
+def scan(tmp_path) -> Path:
     path = tmp_path / "scan.bin"
     scene(200).tofile(path)
     write_labels(path.with_suffix(".label"), np.repeat([0, 110], 100))
@@ -88,7 +88,7 @@ def outcomes(plain: Any, *commands: list[str]) -> list[tuple[int, str, str]]:
     return [tuple(json.loads(line)) for line in printed.splitlines()]
 
 
-def test_the_process_finds_what_plain_derain_brings_and_nothing_else(plain: Any) -> None:
+def test_the_process_finds_what_plain_derain_brings_and_nothing_else(plain) -> None:
     code = (
         "import numpy, onnxruntime, small_gicp, yaml, tqdm, lzf\n"
         "from derain.system.extras import EXTRAS\n"
@@ -97,7 +97,7 @@ def test_the_process_finds_what_plain_derain_brings_and_nothing_else(plain: Any)
     assert plain(code).split() == ["flatbuffers"]
 
 
-def test_every_command_has_its_help(plain: Any) -> None:
+def test_every_command_has_its_help(plain) -> None:
     names = [*COMMANDS, *TRAINING]
     for name, (code, out, err) in zip(
         names, outcomes(plain, *([name, "--help"] for name in names)), strict=True
@@ -106,7 +106,7 @@ def test_every_command_has_its_help(plain: Any) -> None:
         assert f"usage: derain {name}" in out.replace("-c ", "derain ")
 
 
-def test_scans_are_cleaned_looked_at_and_labelled(plain: Any, scan: Path) -> None:
+def test_scans_are_cleaned_looked_at_and_labelled(plain, scan) -> None:
     tried = [
         ["run", str(scan), "--out", "cleaned"],
         ["run", "dror", str(scan), "--out", "by_dror", "--most-removed", "1"],
@@ -122,7 +122,7 @@ def test_scans_are_cleaned_looked_at_and_labelled(plain: Any, scan: Path) -> Non
     assert (scan.parent / "cleaned/scan.label").stat().st_size == 4 * 200
 
 
-def test_methods_are_compared_and_the_picture_is_said_to_be_missing(plain: Any, scan: Path) -> None:
+def test_methods_are_compared_and_the_picture_is_said_to_be_missing(plain, scan) -> None:
     bench = ["bench", "--data", str(scan), "--card", "wads", "--methods"]
     bench += ["default", "dror", "position", "all", "--train", str(scan)]
     bench += ["--timed", "1", "--repeats", "1", "--out", "bench"]
@@ -138,9 +138,7 @@ def test_methods_are_compared_and_the_picture_is_said_to_be_missing(plain: Any, 
     assert "pip install 'derain[view]'" in err
 
 
-def test_a_command_whose_extra_is_missing_says_so_in_one_line_before_any_work(
-    plain: Any, scan: Path
-) -> None:
+def test_a_command_whose_extra_is_missing_says_so_in_one_line_before_any_work(plain, scan) -> None:
     given, checkpoint = str(scan), str(default_model().with_suffix(".ckpt"))
     arrow, survey, bag = (scan.with_suffix(suffix) for suffix in (".feather", ".las", ".bag"))
     for file in (arrow, survey, bag):
@@ -185,7 +183,7 @@ def test_a_command_whose_extra_is_missing_says_so_in_one_line_before_any_work(
     assert {*scan.parent.iterdir()} == before
 
 
-def test_an_import_that_no_command_saw_coming_is_told_too(plain: Any) -> None:
+def test_an_import_that_no_command_saw_coming_is_told_too(plain) -> None:
     code = (
         "import sys\n"
         "from derain.cli import main\n"
@@ -201,7 +199,7 @@ def test_an_import_that_no_command_saw_coming_is_told_too(plain: Any) -> None:
     assert exit_code == "2"
 
 
-def test_python_is_told_which_extra_brings_a_name(plain: Any) -> None:
+def test_python_is_told_which_extra_brings_a_name(plain) -> None:
     code = (
         "import derain, pydoc\n"
         "for name in ('Wads', 'OutDet'):\n"

@@ -3,7 +3,6 @@
 import json
 import math
 from dataclasses import replace
-from typing import Any
 
 import pytest
 
@@ -72,8 +71,6 @@ def test_sequences_are_parted_as_those_of_rehearse_3d() -> None:
         (Drive, {"traffic": 10**9}, "traffic: 1000000000 "),
     ],
 )
-def test_an_impossible_campaign_or_drive_is_refused(
-    make: type[Campaign | Drive], wrong: dict[str, Any], message: str
-) -> None:
+def test_an_impossible_campaign_or_drive_is_refused(make, wrong, message) -> None:
     with pytest.raises(InputError, match=message):
         make(**wrong)

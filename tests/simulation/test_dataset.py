@@ -9,7 +9,6 @@ import sys
 import threading
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -57,15 +56,13 @@ def scans(root: Path, name: str) -> list[Scan]:
 
 
 @pytest.fixture(scope="module")
-def track(open3d: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def track(open3d, tmp_path_factory) -> Path:
     root = tmp_path_factory.mktemp("simulated") / "track"
     simulate_track(root, TINY)
     return root
 
 
-def test_scans_hold_labelled_returns_of_their_place_and_rain_by_the_rates(
-    track: Path,
-) -> None:
+def test_scans_hold_labelled_returns_of_their_place_and_rain_by_the_rates(track) -> None:
     rates = read_manifest(track)["rain_rate_mm_h"]
     assert rates == {"000": 0.0, "001": 50.0, "002": 0.0, "003": 50.0}
     for name, rate in rates.items():
@@ -87,7 +84,7 @@ def test_scans_hold_labelled_returns_of_their_place_and_rain_by_the_rates(
 
 
 def test_the_manifest_describes_the_campaign_and_every_other_file_and_names_no_folder(
-    track: Path,
+    track,
 ) -> None:
     manifest, there = read_manifest(track), contents(track)
     del there["manifest.json"]
@@ -97,7 +94,7 @@ def test_the_manifest_describes_the_campaign_and_every_other_file_and_names_no_f
 
 
 def test_a_run_that_failed_leaves_nothing_half_written_and_is_taken_up_by_any_workers(
-    track: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    track, tmp_path, monkeypatch
 ) -> None:
     root, write = tmp_path / "track", sequence.write_labels
 
@@ -126,9 +123,7 @@ def test_a_run_that_failed_leaves_nothing_half_written_and_is_taken_up_by_any_wo
     assert contents(root) == contents(track)
 
 
-def test_shards_make_the_same_data_set_and_the_last_completes_its_manifest(
-    track: Path, tmp_path: Path
-) -> None:
+def test_shards_make_the_same_data_set_and_the_last_completes_its_manifest(track, tmp_path) -> None:
     root = tmp_path / "track"
     assert not simulate_track(root, TINY, shard=Shard(1, 2))
     assert "files" not in read_manifest(root)
@@ -137,7 +132,7 @@ def test_shards_make_the_same_data_set_and_the_last_completes_its_manifest(
 
 
 def test_a_data_set_that_is_there_is_not_made_twice_with_and_without_locks(
-    track: Path, monkeypatch: pytest.MonkeyPatch
+    track, monkeypatch
 ) -> None:
     before = times(track)
     simulate_track(track, TINY)
@@ -146,9 +141,7 @@ def test_a_data_set_that_is_there_is_not_made_twice_with_and_without_locks(
     assert times(track) == before
 
 
-def test_a_second_run_waits_for_the_first(
-    track: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_second_run_waits_for_the_first(track, tmp_path, capsys) -> None:
     root = tmp_path / "track"
     root.mkdir()
     first = os.open(root, os.O_RDONLY)
@@ -166,7 +159,7 @@ def test_a_second_run_waits_for_the_first(
 
 
 def test_a_data_set_made_for_a_program_is_replaced_by_that_of_another_campaign(
-    open3d: ModuleType, tmp_path: Path
+    open3d, tmp_path
 ) -> None:
     root, scan = tmp_path / "track", "sequences/000/lidar_radar_pcd/000000.bin"
     written = set()
@@ -179,7 +172,7 @@ def test_a_data_set_made_for_a_program_is_replaced_by_that_of_another_campaign(
     assert len(written) == 3
 
 
-def test_what_others_made_or_cannot_be_is_left_alone(track: Path, tmp_path: Path) -> None:
+def test_what_others_made_or_cannot_be_is_left_alone(track, tmp_path) -> None:
     (tmp_path / "manifest.json").write_text('{"made_by": "somebody else"}')
     (tmp_path / "thesis.txt").write_text("years of work")
     before = times(track) | times(tmp_path)
@@ -195,9 +188,7 @@ def test_what_others_made_or_cannot_be_is_left_alone(track: Path, tmp_path: Path
     assert times(track) | times(tmp_path) == before
 
 
-def test_neither_range_nor_intensity_separates_rain_in_a_street(
-    open3d: ModuleType, tmp_path: Path
-) -> None:
+def test_neither_range_nor_intensity_separates_rain_in_a_street(open3d, tmp_path) -> None:
     simulate_track(tmp_path, replace(ONE, train=3, rain_rates=(50.0,)))
     found = [scan for name in ("000", "001", "002") for scan in scans(tmp_path, name)]
     rain = np.concatenate([scan.label == TrackClass.RAIN for scan in found])

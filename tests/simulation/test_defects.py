@@ -80,7 +80,7 @@ def test_a_return_that_is_alone_is_copied_and_distances_go_to_the_nearest_step()
 
 
 @pytest.mark.parametrize("beams", [0, 1, 2])
-def test_few_beams_are_no_trouble(beams: int) -> None:
+def test_few_beams_are_no_trouble(beams) -> None:
     given = of_ranges(np.arange(1.0, beams + 1))
     everything = Defects(0.5, 0.5, 0.5, 1.0, 0.0, 0.1, 1.0)
     sensor = Sensor(rows=1, columns=2, returns="dual", defects=everything)
@@ -143,6 +143,6 @@ def test_a_drop_takes_no_part_in_a_border_and_nothing_becomes_rain() -> None:
     ("name", "value"),
     [("dropped", 1.1), ("dropped_sectors", math.nan), ("copies", -1.0), ("merging", math.inf)],
 )
-def test_impossible_defects_are_refused_by_name(name: str, value: float) -> None:
+def test_impossible_defects_are_refused_by_name(name, value) -> None:
     with pytest.raises(InputError, match=f"defects: {name}: "):
         Defects(**{name: value})

@@ -29,9 +29,7 @@ def drawn() -> list[Sensor]:
     return [draw_sensor(SPANS, np.random.default_rng(seed)) for seed in range(400)]
 
 
-def test_values_lie_in_their_spans_evenly_or_evenly_in_their_logarithms(
-    drawn: list[Sensor],
-) -> None:
+def test_values_lie_in_their_spans_evenly_or_evenly_in_their_logarithms(drawn) -> None:
     logarithmic = {field.name for field in fields(SPANS) if field.type == LogSpan}
     assert len(NUMBERS) == 12
     for name in NUMBERS:
@@ -45,7 +43,7 @@ def test_values_lie_in_their_spans_evenly_or_evenly_in_their_logarithms(
     assert draw_sensor(SPANS, np.random.default_rng(7)) == drawn[7]
 
 
-def test_kinds_and_returns_come_by_their_weights(drawn: list[Sensor]) -> None:
+def test_kinds_and_returns_come_by_their_weights(drawn) -> None:
     spinning = [sensor.azimuth == (-180, 180) for sensor in drawn]
     rosette = [sensor.pattern == "rosette" for sensor in drawn]
     dual = [sensor.returns == "dual" for sensor in drawn]
@@ -56,9 +54,7 @@ def test_kinds_and_returns_come_by_their_weights(drawn: list[Sensor]) -> None:
     assert rows == set(SPANS.spinning_rows)
 
 
-def test_columns_are_as_far_apart_as_stated_or_farther_where_beams_would_be_too_many(
-    drawn: list[Sensor],
-) -> None:
+def test_columns_are_as_far_apart_as_stated_or_farther_where_beams_would_be_too_many(drawn) -> None:
     low, high = SPANS.azimuth_step
     for sensor in drawn:
         if sensor.azimuth == (-180, 180):
@@ -87,7 +83,7 @@ SEEDS = range(20)
 @pytest.mark.parametrize("field", [(-25.0, 15.0), (-60.0, -20.0), (5.0, 90.0)])
 @pytest.mark.parametrize("even", [True, False])
 def test_rows_go_from_top_to_bottom_within_the_field_and_closer_at_the_horizon_if_uneven(
-    field: tuple[float, float], even: bool
+    field, even
 ) -> None:
     low, high = field
     for seed in SEEDS:
@@ -145,6 +141,6 @@ def test_a_document_states_what_differs_from_the_defaults() -> None:
         ("defects: {dropped: [0.2, 0.1]}", "dropped"),
     ],
 )
-def test_what_is_impossible_is_refused_by_name(content: str, named: str) -> None:
+def test_what_is_impossible_is_refused_by_name(content, named) -> None:
     with pytest.raises(InputError, match=rf"spans\.yaml: .*{named}"):
         read(content)

@@ -27,7 +27,7 @@ TIMES = np.arange(20) / 10
 
 @pytest.mark.parametrize(("seed", "length"), [(0, 20.0), (1, 0.0), (2, 30.0)])
 def test_things_stand_on_both_sides_of_a_street_all_along_and_nothing_in_the_lanes(
-    seed: int, length: float
+    seed, length
 ) -> None:
     generator = np.random.default_rng(seed)
     street = Street.draw(length, generator)
@@ -55,7 +55,7 @@ def turned(pose: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_sensor_goes_along_the_street_at_its_speed_and_sways_a_little(seed: int) -> None:
+def test_the_sensor_goes_along_the_street_at_its_speed_and_sways_a_little(seed) -> None:
     course = Course.draw(13, np.random.default_rng(seed))
     poses = np.array([course.pose(time, SENSOR) for time in np.arange(0, 5, 0.1)])
     rotation, places = poses[:, :3, :3], poses[:, :3, 3]
@@ -84,7 +84,7 @@ def moved(thing: MovingThing, time: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_cars_drive_and_pedestrians_walk_along_against_and_across_the_street(seed: int) -> None:
+def test_cars_drive_and_pedestrians_walk_along_against_and_across_the_street(seed) -> None:
     street, things = drawn(seed)
     kinds = {(thing.surface.label, bool(abs(thing.velocity[1]) > 1e-6)) for thing in things}
     both = TrackClass.CAR, TrackClass.PEDESTRIAN
@@ -103,7 +103,7 @@ def test_cars_drive_and_pedestrians_walk_along_against_and_across_the_street(see
 
 
 @pytest.mark.parametrize("speed", [0.0, 13.0])
-def test_nobody_runs_into_anybody_else_or_into_the_sensor(speed: float) -> None:
+def test_nobody_runs_into_anybody_else_or_into_the_sensor(speed) -> None:
     _, things = drawn(2, 15, speed)
     for time in TIMES:
         places = [moved(thing, time)[..., :2].reshape(-1, 2) for thing in things]
@@ -152,7 +152,7 @@ def test_what_moves_is_seen_as_if_it_were_built_into_the_street_with_its_number_
 
 
 @pytest.mark.parametrize("speed", [0.0, 13.0])
-def test_a_skewed_scan_is_each_beam_of_the_scene_at_its_own_time(speed: float) -> None:
+def test_a_skewed_scan_is_each_beam_of_the_scene_at_its_own_time(speed) -> None:
     sensor = Sensor(rows=16, columns=50, frame_rate=2)
     straight = scene(Campaign(scans=2, sensor=sensor, drive=Drive(speed, traffic=7)))
     (skewed,) = replace(straight, skew=True).cast(sensor, SCAN_TIMES[1:2])

@@ -2,8 +2,6 @@
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -32,7 +30,7 @@ def scan(seed: int, rate: float, sensor: Sensor) -> Scan:
     return sensor.measure(rain_on_beams(clear, sensor.beams(), rain, sensor, generator), generator)
 
 
-def test_intensities_are_distributed_as_those_of_the_real_one(open3d: ModuleType) -> None:
+def test_intensities_are_distributed_as_those_of_the_real_one(open3d) -> None:
     scans = [scan(seed, 25, COARSE) for seed in HELD_OUT]
     intensity = np.concatenate([each.intensity for each in scans])
     wet = np.concatenate([each.label for each in scans]) == TrackClass.RAIN
@@ -57,7 +55,7 @@ def test_things_stand_on_the_road_within_the_stated_distances_between_the_masts(
         assert masts.min() < y.min() < y.max() < masts.max()
 
 
-def test_the_road_is_no_darker_far_away_than_half_of_what_it_is_near(open3d: ModuleType) -> None:
+def test_the_road_is_no_darker_far_away_than_half_of_what_it_is_near(open3d) -> None:
     for seed in HELD_OUT:
         seen = scan(seed, 25, COARSE)
         road = seen.label == TrackClass.ROAD
@@ -65,7 +63,7 @@ def test_the_road_is_no_darker_far_away_than_half_of_what_it_is_near(open3d: Mod
         assert np.median(seen.intensity[far]) > 0.5 * np.median(seen.intensity[near])
 
 
-def test_the_published_network_finds_the_rain(shared: Path, open3d: ModuleType) -> None:
+def test_the_published_network_finds_the_rain(shared, open3d) -> None:
     from benchmarks.facility_observer import published_network
 
     weights = shared / "oracles" / "outdet_rehearse3d.pt"
@@ -76,7 +74,7 @@ def test_the_published_network_finds_the_rain(shared: Path, open3d: ModuleType) 
     assert counts.iou > 0.9
 
 
-def test_materials_leave_a_seeds_places_where_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_materials_leave_a_seeds_places_where_they_are(monkeypatch) -> None:
     before = lay_out_facility(np.random.default_rng(3))
     monkeypatch.setattr(facility, "ASPHALT_REFLECTIVITY", (0.5, 0.6))
     monkeypatch.setattr(facility, "LEAVES", (0.9, 1.0))

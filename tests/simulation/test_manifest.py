@@ -1,8 +1,5 @@
 """The manifest of a simulated data set: recognised, and refused where it is damaged."""
 
-from pathlib import Path
-from typing import Any
-
 import pytest
 
 from derain.errors import InputError
@@ -11,7 +8,7 @@ from derain.simulation.campaign import Campaign
 from derain.simulation.manifest import MAKER, read_manifest, write_manifest
 
 
-def test_a_manifest_comes_back(tmp_path: Path) -> None:
+def test_a_manifest_comes_back(tmp_path) -> None:
     files = {f"sequences/{n // 500:03d}/velodyne/{n:06d}.bin": 64 * "0" for n in range(20_000)}
     content = {**Campaign().description, "keep": True, "files": files}
     write_manifest(tmp_path, content)
@@ -27,7 +24,7 @@ def test_a_manifest_comes_back(tmp_path: Path) -> None:
     ],
     ids=shown,
 )
-def test_what_derain_did_not_write_is_no_manifest_of_its(tmp_path: Path, text: str) -> None:
+def test_what_derain_did_not_write_is_no_manifest_of_its(tmp_path, text) -> None:
     assert read_manifest(tmp_path) == {}
     (tmp_path / "manifest.json").write_text(text, "latin-1")
     assert read_manifest(tmp_path) == {}
@@ -49,9 +46,7 @@ def test_what_derain_did_not_write_is_no_manifest_of_its(tmp_path: Path, text: s
         ("keep", "no", "keep"),
     ],
 )
-def test_a_manifest_with_a_value_of_another_kind_is_refused(
-    tmp_path: Path, key: str, value: Any, where: str
-) -> None:
+def test_a_manifest_with_a_value_of_another_kind_is_refused(tmp_path, key, value, where) -> None:
     write_manifest(tmp_path, {"made_by": MAKER, key: value})
     with pytest.raises(InputError) as refusal:
         read_manifest(tmp_path)

@@ -65,7 +65,7 @@ def test_the_command_knows_every_layout() -> None:
 
 
 @pytest.mark.parametrize("place", LAYOUTS)
-def test_a_place_is_of_triangles_that_can_be_seen_and_another_by_another_seed(place: str) -> None:
+def test_a_place_is_of_triangles_that_can_be_seen_and_another_by_another_seed(place) -> None:
     for seed in (0, 1):
         track = laid_out(place, seed)
         assert len(track.label) == len(track.triangles) == len(track.reflectivity) < 500_000
@@ -84,9 +84,7 @@ def test_a_seed_gives_the_same_place_again() -> None:
 
 
 @pytest.mark.parametrize("place", PLACES)
-def test_people_cars_and_the_rest_are_near_and_all_around_but_not_at_the_sensor(
-    place: str,
-) -> None:
+def test_people_cars_and_the_rest_are_near_and_all_around_but_not_at_the_sensor(place) -> None:
     ends, label = seen(place)
     distance = np.linalg.norm(ends, axis=1)
     level = np.abs(ends[:, 2]) < 1.0  # neither the ground nor a ceiling
@@ -148,9 +146,7 @@ def test_a_horizon_is_far_and_many_of_its_returns_are_by_themselves() -> None:
 
 
 @pytest.mark.parametrize("height", [0.5, 1.8, 5.0])
-def test_a_carrier_is_near_and_dark_and_nowhere_nearer_than_a_tenth_of_a_metre(
-    height: float,
-) -> None:
+def test_a_carrier_is_near_and_dark_and_nowhere_nearer_than_a_tenth_of_a_metre(height) -> None:
     sensor, shares, seeds = all_around(-80, 60, 70, 360, height), [], 16
     for seed in range(seeds):
         surfaces = list(lay_out_carrier(np.random.default_rng(seed), height))

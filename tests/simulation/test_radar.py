@@ -92,7 +92,7 @@ def test_the_rain_fills_every_cell_up_to_what_blocks_the_view() -> None:
 
 
 @pytest.mark.parametrize("rain", [DRY, HEAVY], ids=["dry", "heavy rain"])
-def test_false_alarms_are_as_rare_as_stated_whether_or_not_it_rains(rain: RainField) -> None:
+def test_false_alarms_are_as_rare_as_stated_whether_or_not_it_rains(rain) -> None:
     radar = replace(NARROW, false_alarm_rate=2e-3)
     scans = frames(OPEN, radar, 60, rain)
     cells = math.prod(radar.shape)
@@ -106,7 +106,7 @@ def test_false_alarms_are_as_rare_as_stated_whether_or_not_it_rains(rain: RainFi
 
 
 @pytest.mark.parametrize("reach", [90, 120, 200])
-def test_a_target_is_detected_as_often_as_by_the_closed_form(reach: float) -> None:
+def test_a_target_is_detected_as_often_as_by_the_closed_form(reach) -> None:
     # An isolated Swerling 1 target of a signal S times the noise, by cell-averaging CFAR over N
     # cells: (1 + T / (1 + S))^-N where T = P^(-1/N) - 1 for a false alarm rate of P.
     # Source: Finn and Johnson 1968.

@@ -75,7 +75,7 @@ def rained(clear: Returns, rain: RainField, seed: int, sensor: Sensor = SENSOR) 
 
 
 @pytest.mark.parametrize("sensor", [SENSOR, FRUSTUM])
-def test_drops_are_poisson_with_the_volume_of_the_beam_and_even_in_it(sensor: Sensor) -> None:
+def test_drops_are_poisson_with_the_volume_of_the_beam_and_even_in_it(sensor) -> None:
     beams, far = 20_000, 12.0
     drops = draw_drops(25, np.full(beams, far), sensor, np.random.default_rng(2))
     counts = np.bincount(drops.beam, minlength=beams)
@@ -114,7 +114,7 @@ def test_uneven_rain_has_the_drops_of_the_rate_where_they_fall() -> None:
 
 
 @pytest.mark.parametrize("sensor", [SENSOR, FRUSTUM])
-def test_the_largest_drop_is_at_the_threshold_where_visibility_ends(sensor: Sensor) -> None:
+def test_the_largest_drop_is_at_the_threshold_where_visibility_ends(sensor) -> None:
     horizon = farthest_visible_drop(sensor)
     largest = Drops(np.zeros(1, np.int64), np.array([horizon]), np.array([LARGEST_DROP]))
     power = drop_reflectivity(largest, sensor)[0] / horizon**2
@@ -122,7 +122,7 @@ def test_the_largest_drop_is_at_the_threshold_where_visibility_ends(sensor: Sens
 
 
 @pytest.mark.parametrize("rate", RATES)
-def test_open_beams_see_as_much_rain_as_the_integral_over_visible_drops(rate: float) -> None:
+def test_open_beams_see_as_much_rain_as_the_integral_over_visible_drops(rate) -> None:
     """A visible drop is at least as wide as D(r) where its power is the threshold.
 
     The visible drops of a beam are a Poisson process, so the share of beams with none is
@@ -155,9 +155,7 @@ def crowded(clear: Returns, generator: Generator, monkeypatch: pytest.MonkeyPatc
     return drops
 
 
-def test_the_strongest_and_the_last_of_all_that_a_beam_meets_are_reported(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_strongest_and_the_last_of_all_that_a_beam_meets_are_reported(monkeypatch) -> None:
     generator, rain = np.random.default_rng(6), UniformRain(25)
     clear = random_surfaces(300, generator)
     drops = crowded(clear, generator, monkeypatch)
@@ -201,7 +199,7 @@ def test_the_strongest_and_the_last_of_all_that_a_beam_meets_are_reported(
     sensor=st.sampled_from([SENSOR, LAST, DUAL, replace(SENSOR, aperture=0.01)]),
 )
 def test_energy_never_grows_and_a_beam_is_kept_weaker_or_ends_at_a_drop_or_is_lost(
-    rate: float, seed: int, sensor: Sensor
+    rate, seed, sensor
 ) -> None:
     clear = random_surfaces(2000, np.random.default_rng(seed))
     detected = rained(clear, UniformRain(rate), seed, sensor)
@@ -235,7 +233,7 @@ def test_even_rain_takes_light_exponentially_in_every_direction() -> None:
 
 
 @pytest.mark.parametrize("nominal", [10.0, 50.0])
-def test_uneven_rain_takes_light_by_the_integral_along_each_beam(nominal: float) -> None:
+def test_uneven_rain_takes_light_by_the_integral_along_each_beam(nominal) -> None:
     rain, generator = SprinkledRain(nominal), np.random.default_rng(2)
     beams = random_beams(200, generator)
     beams[::2, :2] = [1, 0]  # half of them down the track, at all inclinations

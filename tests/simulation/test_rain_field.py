@@ -9,7 +9,6 @@ from derain.errors import InputError
 from derain.simulation.radar import volume_reflectivity
 from derain.simulation.rain_field import (
     INTERCEPT,
-    RainField,
     SprinkledRain,
     UniformRain,
     drops_per_cubic_metre,
@@ -28,7 +27,7 @@ from derain.simulation.scene import STRONGEST_WIND, draw_wind, weather_record
     ],
 )
 def test_rain_has_marshall_and_palmers_drops_and_takes_light_and_sight_by_their_cross_sections(
-    rate: float, steepness: float, density: float, share_per_metre: float, visibility: float
+    rate, steepness, density, share_per_metre, visibility
 ) -> None:
     assert slope(rate) == pytest.approx(steepness, abs=5e-5)
     assert drops_per_cubic_metre(rate) == pytest.approx(density, abs=0.05)
@@ -60,7 +59,7 @@ def test_clear_air_has_no_drops_and_no_end_to_its_visibility_and_winds_are_weak(
     ("nominal", "even", "span"), [(10.0, 80.0, 112.0), (25.0, 40.0, 56.0), (50.0, 20.0, 28.0)]
 )
 def test_the_facility_rains_its_nominal_rate_on_the_lane_and_little_beyond(
-    nominal: float, even: float, span: float
+    nominal, even, span
 ) -> None:
     rain = SprinkledRain(nominal)
     assert rain.span == span
@@ -98,8 +97,6 @@ def test_the_heaviest_rain_of_the_facility_falls_where_it_was_measured() -> None
         (SprinkledRain, (10, (math.inf, 0)), "wind"),
     ],
 )
-def test_impossible_rain_or_wind_is_refused(
-    rain: type[RainField], given: tuple[object, ...], named: str
-) -> None:
+def test_impossible_rain_or_wind_is_refused(rain, given, named) -> None:
     with pytest.raises(InputError, match=named):
         rain(*given)

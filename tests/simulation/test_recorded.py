@@ -58,18 +58,18 @@ def equal(first: NDArray[Any], second: NDArray[Any]) -> bool:
 
 
 @pytest.fixture(scope="module", params=FILES)
-def clear(request: pytest.FixtureRequest, shared: Path) -> Scan:
+def clear(request, shared) -> Scan:
     """Each of the clean scans."""
     return read_scan(shared / "data" / "clean" / request.param)
 
 
 @pytest.fixture(scope="module")
-def wet(clear: Scan) -> Scan:
+def wet(clear) -> Scan:
     """The same scan in heavy rain, with the number that every row had."""
     return rained(numbered(clear), 50)
 
 
-def test_clear_air_changes_nothing_of_a_real_scan(clear: Scan) -> None:
+def test_clear_air_changes_nothing_of_a_real_scan(clear) -> None:
     same = rained(clear, 0)
     assert same.shape == clear.shape
     assert not is_rain(same).any()
@@ -78,9 +78,7 @@ def test_clear_air_changes_nothing_of_a_real_scan(clear: Scan) -> None:
         assert equal(same.fields[name], column), name
 
 
-def test_drops_on_a_real_scan_lie_on_its_beams_in_front_of_what_was_there(
-    clear: Scan, wet: Scan
-) -> None:
+def test_drops_on_a_real_scan_lie_on_its_beams_in_front_of_what_was_there(clear, wet) -> None:
     drops = is_rain(wet)
     assert drops.sum() > 0.02 * len(drops)
     assert wet.valid[drops].all()
@@ -100,9 +98,7 @@ def test_drops_on_a_real_scan_lie_on_its_beams_in_front_of_what_was_there(
     assert (at < seen.max(axis=0) + HALF_A_PIXEL).all()
 
 
-def test_what_rain_leaves_of_a_real_scan_stays_to_the_bit_and_in_order(
-    clear: Scan, wet: Scan
-) -> None:
+def test_what_rain_leaves_of_a_real_scan_stays_to_the_bit_and_in_order(clear, wet) -> None:
     kept = wet.take(wet.valid & ~is_rain(wet))
     number = kept.fields["number"]
     assert (np.diff(number) > 0).all()
@@ -127,7 +123,7 @@ def test_what_rain_leaves_of_a_real_scan_stays_to_the_bit_and_in_order(
 
 
 @pytest.mark.parametrize(("name", "scan"), list(hard_cases(1000)))
-def test_hard_scans_stay_finite_where_they_were(name: str, scan: Scan) -> None:
+def test_hard_scans_stay_finite_where_they_were(name, scan) -> None:
     for rate in (0, 50):
         wet = rained(scan, rate)
         assert wet.valid[is_rain(wet)].all(), name
@@ -153,9 +149,7 @@ def wall(
 
 @pytest.mark.parametrize("shape", [None, (40, 200)])
 @pytest.mark.parametrize("intensity", [0.0, 0.5, 100.0])
-def test_drops_have_the_intensity_that_the_scan_has_throughout(
-    intensity: float, shape: tuple[int, int] | None
-) -> None:
+def test_drops_have_the_intensity_that_the_scan_has_throughout(intensity, shape) -> None:
     clear = wall(40.0, intensity, shape)
     # Sky, whose cells hold another intensity than the returns.
     sky = np.arange(len(clear)) % 3 == 0
@@ -204,7 +198,7 @@ def test_a_bright_return_is_kept_and_dimmed_by_the_light_that_rain_takes() -> No
 
 
 @pytest.mark.parametrize("full_scale", [1.0, 255.0, 65_535.0])
-def test_drops_are_as_bright_as_water_on_the_scale_of_the_scan(full_scale: float) -> None:
+def test_drops_are_as_bright_as_water_on_the_scale_of_the_scan(full_scale) -> None:
     clear = wall(40.0, full_scale, last=full_scale / 2)
     wet = rained(clear, 50)
     drops = is_rain(wet)
@@ -214,7 +208,7 @@ def test_drops_are_as_bright_as_water_on_the_scale_of_the_scan(full_scale: float
 
 @pytest.mark.parametrize(("gaps", "nothing"), [(0, np.nan), (1, np.nan), (1, 0.0)])
 def test_a_lost_return_looks_like_an_empty_cell_or_is_not_a_number_and_labels_are_kept(
-    gaps: int, nothing: float
+    gaps, nothing
 ) -> None:
     clear = wall(110.0, 0.0, last=255)
     clear.xyz[:gaps] = nothing

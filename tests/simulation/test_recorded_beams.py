@@ -1,7 +1,5 @@
 """The beams behind recorded scans, against sensors whose beams are known."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -48,9 +46,7 @@ def lagging() -> Floats:
 
 
 @pytest.mark.parametrize("nothing", [np.nan, 0.0])
-def test_empty_cells_of_an_organised_scan_look_where_their_row_and_column_look(
-    nothing: float,
-) -> None:
+def test_empty_cells_of_an_organised_scan_look_where_their_row_and_column_look(nothing) -> None:
     returned = np.random.default_rng(2).random(SENSOR.rows * SENSOR.columns) < 0.6
     scan = recording(returned, nothing)
     beams = beams_of(scan)
@@ -112,7 +108,7 @@ def off_axis(direction: Floats, about: float) -> Floats:
 
 
 @pytest.mark.parametrize("about", [0.0, 180.0])
-def test_a_rosette_has_no_beams_outside_its_circle(about: float) -> None:
+def test_a_rosette_has_no_beams_outside_its_circle(about) -> None:
     direction = rosette(24_000, about)
     generator = np.random.default_rng(8)
     returned = generator.random(len(direction)) < 0.8
@@ -134,7 +130,7 @@ def test_cells_tell_nothing_of_beams_that_are_not_in_rows_and_columns() -> None:
 
 
 @pytest.mark.parametrize("name", ORGANISED)
-def test_directions_of_real_returns_are_found_when_they_are_hidden(name: str, shared: Path) -> None:
+def test_directions_of_real_returns_are_found_when_they_are_hidden(name, shared) -> None:
     scan = read_scan(shared / "data" / "clean" / name)
     hidden = scan.valid & (np.random.default_rng(7).random(len(scan)) < 0.3)
     xyz = scan.xyz.copy()
@@ -157,9 +153,7 @@ def as_columns(points: list[tuple[float, float]]) -> tuple[np.ndarray, np.ndarra
 
 
 @given(polygons, lattice)
-def test_a_place_is_outside_if_a_line_parts_it_from_every_point(
-    points: list[tuple[int, int]], place: tuple[int, int]
-) -> None:
+def test_a_place_is_outside_if_a_line_parts_it_from_every_point(points, place) -> None:
     # Hulls of such points have edges in these directions only; so do the lines that part.
     normals = np.stack(np.meshgrid(np.arange(-8, 9), np.arange(-8, 9))).reshape(2, -1)
     parted = ((np.array(points) - place) @ normals > 0).all(axis=0).any()

@@ -3,7 +3,6 @@
 import json
 import math
 from dataclasses import asdict, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -137,7 +136,7 @@ def test_intensity_stays_within_its_scale() -> None:
     assert scan.intensity.dtype == scan.xyz.dtype == np.float32
 
 
-def test_every_packaged_sensor_is_written_out_in_full_and_survives_json(tmp_path: Path) -> None:
+def test_every_packaged_sensor_is_written_out_in_full_and_survives_json(tmp_path) -> None:
     for name in packaged_sensors():
         stated = set(packaged_sensors()[name].read_text().replace(":", " ").split())
         assert set(asdict(Sensor())) - SELDOM_STATED <= stated
@@ -146,7 +145,7 @@ def test_every_packaged_sensor_is_written_out_in_full_and_survives_json(tmp_path
         assert load_sensor(path) == load_sensor(name)
 
 
-def test_a_sensor_file_states_what_differs_from_the_defaults(tmp_path: Path) -> None:
+def test_a_sensor_file_states_what_differs_from_the_defaults(tmp_path) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text("rows: 32\nreturns: dual\nazimuth: [-180, 180]\n")
     assert load_sensor(path) == Sensor(rows=32, returns="dual", azimuth=(-180, 180))
@@ -168,7 +167,7 @@ def test_a_sensor_file_states_what_differs_from_the_defaults(tmp_path: Path) -> 
         *("- rows", "rows: [", "just text", ""),
     ],
 )
-def test_a_file_that_describes_no_sensor_is_refused(content: str, tmp_path: Path) -> None:
+def test_a_file_that_describes_no_sensor_is_refused(content, tmp_path) -> None:
     path = tmp_path / "broken.yaml"
     path.write_text(content)
     with pytest.raises(InputError, match=r"broken\.yaml: ") as refusal:

@@ -3,7 +3,6 @@
 import csv
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -46,16 +45,16 @@ def written(folder: Path, **changes: Any) -> Path:
 
 
 @pytest.fixture(scope="module")
-def folder(open3d: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(open3d, tmp_path_factory) -> Path:
     return written(tmp_path_factory.mktemp("sequence") / "000", radar=Radar())
 
 
 @pytest.fixture(scope="module")
-def drive(open3d: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def drive(open3d, tmp_path_factory) -> Path:
     return written(tmp_path_factory.mktemp("drive") / "000", **DRIVE)
 
 
-def test_the_folders_and_files_are_those_of_rehearse_3d(folder: Path) -> None:
+def test_the_folders_and_files_are_those_of_rehearse_3d(folder) -> None:
     assert {file.name for file in folder.iterdir()} == OF_LIDAR | OF_RADAR | {EXTRINSICS}
     suffixes = {"lidar_radar_labels": "label", "weather": "csv", "ext_radar": "csv"}
     for kind in OF_LIDAR | OF_RADAR:
@@ -65,7 +64,7 @@ def test_the_folders_and_files_are_those_of_rehearse_3d(folder: Path) -> None:
         assert frames == [f"{number:06d}" for number in range(len(frames))]
 
 
-def test_without_a_radar_only_its_folders_are_missing(folder: Path, tmp_path: Path) -> None:
+def test_without_a_radar_only_its_folders_are_missing(folder, tmp_path) -> None:
     without_radar = written(tmp_path / "000")
     assert {file.name for file in without_radar.iterdir()} == OF_LIDAR
     assert not list(without_radar.rglob("poses.txt"))  # where nothing moves
@@ -75,7 +74,7 @@ def test_without_a_radar_only_its_folders_are_missing(folder: Path, tmp_path: Pa
         assert alone.read_bytes() == file.read_bytes()
 
 
-def test_a_merged_cloud_is_the_scan_and_the_radar_frame_nearest_in_time(folder: Path) -> None:
+def test_a_merged_cloud_is_the_scan_and_the_radar_frame_nearest_in_time(folder) -> None:
     lidar, radar = times(folder / "innoviz"), times(folder / "radar_pcd")
     assert lidar == pytest.approx([0, 0.1, 0.2])
     assert np.diff(radar) == pytest.approx(1 / 16.5, abs=2e-6)
@@ -95,7 +94,7 @@ def test_a_merged_cloud_is_the_scan_and_the_radar_frame_nearest_in_time(folder: 
         assert set(label) <= set(TrackClass)
 
 
-def test_the_extended_radar_has_the_same_points_and_what_was_measured_of_them(folder: Path) -> None:
+def test_the_extended_radar_has_the_same_points_and_what_was_measured_of_them(folder) -> None:
     extended = table(folder / "ext_radar/000001.csv")
     names = ["x", "y", "z", "intensity", "cross_section", "velocity", "confidence"]
     assert list(extended) == names
@@ -109,7 +108,7 @@ def test_the_extended_radar_has_the_same_points_and_what_was_measured_of_them(fo
     assert ((columns["confidence"] > 0.9) & (columns["confidence"] <= 1)).mean() > 0.9
 
 
-def test_the_weather_is_that_of_the_campaign(folder: Path) -> None:
+def test_the_weather_is_that_of_the_campaign(folder) -> None:
     for frame in table(folder / "weather/metadata.csv")["frame"]:
         weather = table(folder / "weather" / f"{frame}.csv")
         assert weather["rain_rate_mm_h"] == ["25"]
@@ -117,7 +116,7 @@ def test_the_weather_is_that_of_the_campaign(folder: Path) -> None:
         assert float(weather["drop_slope_per_mm"][0]) == pytest.approx(2.0855, rel=1e-4)
 
 
-def test_the_poses_of_a_drive_take_the_road_of_every_scan_to_the_same_place(drive: Path) -> None:
+def test_the_poses_of_a_drive_take_the_road_of_every_scan_to_the_same_place(drive) -> None:
     road: list[NDArray[np.float64]] = []
     seen: set[int] = set()
     for kind in ("innoviz", "lidar_radar_pcd"):
@@ -144,9 +143,7 @@ def test_the_poses_of_a_drive_take_the_road_of_every_scan_to_the_same_place(driv
     assert seen <= set(range(1, 6))
 
 
-def test_the_radar_stands_above_a_tilted_sensor_as_above_a_level_one(
-    folder: Path, tmp_path: Path
-) -> None:
+def test_the_radar_stands_above_a_tilted_sensor_as_above_a_level_one(folder, tmp_path) -> None:
     tilted = replace(load_sensor("mems_64"), tilt=(4.0, 12.0))
     extrinsics = read_extrinsics(written(tmp_path, sensor=tilted, radar=Radar()) / EXTRINSICS)
     level = read_extrinsics(folder / EXTRINSICS)
@@ -156,7 +153,7 @@ def test_the_radar_stands_above_a_tilted_sensor_as_above_a_level_one(
 
 
 def test_poses_of_a_tilted_sensor_are_those_of_a_level_one_in_its_own_frame(
-    drive: Path, tmp_path: Path
+    drive, tmp_path
 ) -> None:
     tilted = replace(load_sensor("mems_64"), tilt=(3.0, 10.0), rows=2)
     folders = drive, written(tmp_path, **DRIVE, sensor=tilted)

@@ -1,7 +1,5 @@
 """Shapes against school geometry; the ray-cast track against closed forms and all triangles."""
 
-from types import ModuleType
-
 import numpy as np
 import pytest
 
@@ -94,9 +92,7 @@ SENSOR = Sensor(rows=16, columns=40)
 
 
 @pytest.mark.parametrize("roughness", [0.0, 0.6])
-def test_flat_ground_lies_where_its_angle_says_and_darkens_with_it(
-    open3d: ModuleType, roughness: float
-) -> None:
+def test_flat_ground_lies_where_its_angle_says_and_darkens_with_it(open3d, roughness) -> None:
     plane = shapes.rectangle((-500, 500), (-500, 500), 0)
     track = Track.of([Surface(plane, TrackClass.ROAD, 0.3, roughness)])
     track.cast(Sensor(rows=4, columns=10))  # another sensor sees the same track
@@ -114,7 +110,7 @@ def test_flat_ground_lies_where_its_angle_says_and_darkens_with_it(
     assert (clear.range[~hit] == SENSOR.maximum_range).all()
 
 
-def test_casting_finds_the_nearest_of_all_triangles(open3d: ModuleType) -> None:
+def test_casting_finds_the_nearest_of_all_triangles(open3d) -> None:
     generator = np.random.default_rng(0)
     corners = generator.uniform((5, -10, 0), (30, 10, 4), (60, 1, 3))
     triangles = corners + generator.normal(0, 2, (60, 3, 3))
@@ -144,7 +140,7 @@ def test_casting_finds_the_nearest_of_all_triangles(open3d: ModuleType) -> None:
 
 
 @pytest.mark.parametrize("roughness", [0.0, 0.1, 0.6, 1.0])
-def test_light_comes_back_as_if_the_eye_were_where_the_light_is(roughness: float) -> None:
+def test_light_comes_back_as_if_the_eye_were_where_the_light_is(roughness) -> None:
     angle, variance = np.radians(np.linspace(0, 89, 90)), roughness**2
     facing, grazing = 1 - 0.5 * variance / (variance + 0.33), 0.45 * variance / (variance + 0.09)
     expected = np.cos(angle) * (facing + grazing * np.sin(angle) * np.tan(angle))

@@ -1,8 +1,6 @@
 """The training world: drawn by its spans, the same by its seed, refused where impossible."""
 
 from dataclasses import replace
-from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -25,20 +23,20 @@ precipitation: {snow: {weight: 1, crowding: [0.1, 0.3]}}
 
 
 @pytest.fixture(scope="module")
-def small(open3d: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> str:
+def small(open3d, tmp_path_factory) -> str:
     path = tmp_path_factory.mktemp("world") / "small.yaml"
     path.write_text(SMALL, "utf-8")
     return str(path)
 
 
 @pytest.mark.parametrize("name", packaged_worlds())
-def test_a_packaged_world_draws_from_places_and_kinds_that_there_are(name: str) -> None:
+def test_a_packaged_world_draws_from_places_and_kinds_that_there_are(name) -> None:
     world = load_world(name)
     assert world.places.keys() == LAYOUTS.keys()
     assert {name for name, _ in world.precipitation.kinds} >= {"none", "rain"}
 
 
-def test_a_scan_is_of_its_world(small: str) -> None:
+def test_a_scan_is_of_its_world(small) -> None:
     scan, drawn = draw_scan(load_world(small), np.random.default_rng(5))
     assert drawn["place"] == "street"
     assert drawn["sensor"]["rows"] == 16
@@ -47,16 +45,14 @@ def test_a_scan_is_of_its_world(small: str) -> None:
     assert (scan.label == TrackClass.RAIN).any()
 
 
-def test_a_world_of_nothing_but_rain_is_refused(
-    small: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_world_of_nothing_but_rain_is_refused(small, monkeypatch) -> None:
     monkeypatch.setattr("derain.simulation.world.LARGEST_SHARE_OF_RAIN", -1)
     monkeypatch.setattr("derain.simulation.world.MOST_TRIES", 2)
     with pytest.raises(InputError, match=r"world: .*rain"):
         draw_scan(load_world(small), np.random.default_rng(5))
 
 
-def test_a_seed_gives_the_same_scans_however_many_there_are(small: str, tmp_path: Path) -> None:
+def test_a_seed_gives_the_same_scans_however_many_there_are(small, tmp_path) -> None:
     few = WorldCampaign(train=2, validation=0, seed=3, world=small)
     more = WorldCampaign(train=2, validation=1, test=1, seed=3, world=small)
     simulate_track(tmp_path / "few", few)
@@ -81,7 +77,7 @@ def test_a_seed_gives_the_same_scans_however_many_there_are(small: str, tmp_path
         ({"precipitation": {"frogs": {}}}, "frogs"),
     ],
 )
-def test_a_world_that_cannot_be_is_refused(document: object, named: str) -> None:
+def test_a_world_that_cannot_be_is_refused(document, named) -> None:
     with pytest.raises(InputError, match=rf"w\.yaml: .*{named}"):
         World.of(Entry("w.yaml", "", document))
 

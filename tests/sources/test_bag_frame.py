@@ -27,12 +27,12 @@ XYZI = ("x", "y", "z", "intensity")
 
 
 @pytest.fixture(params=STORAGES)
-def storage(request: pytest.FixtureRequest) -> Storage:
+def storage(request) -> Storage:
     kind: Storage = request.param
     return kind
 
 
-def test_frames_are_the_clouds_in_order(tmp_path: Path, storage: Storage) -> None:
+def test_frames_are_the_clouds_in_order(tmp_path, storage) -> None:
     bag = small_bag(tmp_path, storage)
     source = named_frames([bag])
 
@@ -55,7 +55,7 @@ def test_frames_are_the_clouds_in_order(tmp_path: Path, storage: Storage) -> Non
         assert frame.count_points() == len(table)
 
 
-def test_a_cloud_without_a_stamp_was_taken_when_it_was_recorded(tmp_path: Path) -> None:
+def test_a_cloud_without_a_stamp_was_taken_when_it_was_recorded(tmp_path) -> None:
     ros = Ros("mcap")
     cloud = ros.cloud(tables(1)[0], 0)
     bag = small_bag(tmp_path, "mcap", clouds=[], more=[Recorded(POINTS, CLOUD_TYPE, START, cloud)])
@@ -63,9 +63,7 @@ def test_a_cloud_without_a_stamp_was_taken_when_it_was_recorded(tmp_path: Path) 
 
 
 @pytest.mark.parametrize("period", [PERIOD, 0])
-def test_any_order_gives_the_same_clouds_also_of_one_time(
-    tmp_path: Path, storage: Storage, period: int
-) -> None:
+def test_any_order_gives_the_same_clouds_also_of_one_time(tmp_path, storage, period) -> None:
     ros, clouds = Ros(storage), tables(24, points=20)
     times = [START + number * period for number in range(24)]
     recorded = [
@@ -79,7 +77,7 @@ def test_any_order_gives_the_same_clouds_also_of_one_time(
         np.testing.assert_array_equal(source[number].read().xyz[:, 0], clouds[number]["x"])
 
 
-def test_a_path_leads_into_a_bag(tmp_path: Path) -> None:
+def test_a_path_leads_into_a_bag(tmp_path) -> None:
     bag = small_bag(tmp_path, "mcap")
     for path in (bag / "velodyne_points" / "000002", bag / "000002"):
         (frame,) = named_frames([path])
@@ -91,13 +89,13 @@ def test_a_path_leads_into_a_bag(tmp_path: Path) -> None:
         named_frames([bag / "000003"])
 
 
-def test_the_single_file_of_a_folder_is_a_bag_too(tmp_path: Path) -> None:
+def test_the_single_file_of_a_folder_is_a_bag_too(tmp_path) -> None:
     for storage, name in (("mcap", "a.mcap"), ("sqlite3", "b.db3")):
         bag = small_bag(tmp_path, storage, Path(name).stem)  # type: ignore[arg-type]
         assert len(named_frames([bag / name])) == 3
 
 
-def test_a_folder_of_bags_stands_for_them(tmp_path: Path) -> None:
+def test_a_folder_of_bags_stands_for_them(tmp_path) -> None:
     for name in ("b", "a"):
         small_bag(tmp_path, "ros1", name)
     source = named_frames([tmp_path])
@@ -105,7 +103,7 @@ def test_a_folder_of_bags_stands_for_them(tmp_path: Path) -> None:
     assert not source[3].follows(source[2])
 
 
-def test_labels_lie_beside_the_bag(tmp_path: Path) -> None:
+def test_labels_lie_beside_the_bag(tmp_path) -> None:
     bag = small_bag(tmp_path, "ros1")
     label = np.arange(300) % 2
     write_labels(tmp_path / "drive.labels" / "000001.label", label)
@@ -116,7 +114,7 @@ def test_labels_lie_beside_the_bag(tmp_path: Path) -> None:
     assert not any(frame.has_labels for frame in named_frames([bag]))
 
 
-def test_organised_big_endian_clouds_of_doubles_are_read(tmp_path: Path) -> None:
+def test_organised_big_endian_clouds_of_doubles_are_read(tmp_path) -> None:
     ros, (table,) = Ros("mcap"), tables(1)
     doubles = table_of({name: table[name].astype(">f8") for name in XYZI})
     cloud = ros.cloud(doubles, START, shape=(10, 30))
@@ -136,18 +134,14 @@ def test_organised_big_endian_clouds_of_doubles_are_read(tmp_path: Path) -> None
         ({"x": "(2,)f4", "y": "f4", "z": "f4"}, "float32 of 2 values"),
     ],
 )
-def test_clouds_without_coordinates_are_refused(
-    tmp_path: Path, columns: dict[str, str], reason: str
-) -> None:
+def test_clouds_without_coordinates_are_refused(tmp_path, columns, reason) -> None:
     bag = small_bag(tmp_path, "mcap", clouds=[np.ones(4, list(columns.items()))])
     with pytest.raises(InputError, match=reason) as error:
         named_frames([bag])[0].read()
     assert str(error.value.subject).endswith("velodyne_points/000000")
 
 
-def test_other_fields_on_the_way_are_told_once(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_other_fields_on_the_way_are_told_once(tmp_path, capsys) -> None:
     first, *others = tables(4)
     fewer = table_of({name: first[name] for name in "xyz"})
     source = named_frames([small_bag(tmp_path, "mcap", clouds=[fewer, *others])])
@@ -159,9 +153,7 @@ def test_other_fields_on_the_way_are_told_once(
     assert "000001" in told
 
 
-def test_what_is_passed_over_beside_bags_is_counted(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_passed_over_beside_bags_is_counted(tmp_path, capsys) -> None:
     small_bag(tmp_path, "mcap")
     (tmp_path / "scan.csv").touch()
     named_frames([tmp_path])

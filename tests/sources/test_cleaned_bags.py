@@ -31,7 +31,7 @@ RUN = ("run", "ror", "--set", "radius=2", "--set", "neighbours=3")
 
 
 @pytest.fixture(params=STORAGES)
-def storage(request: pytest.FixtureRequest) -> Storage:
+def storage(request) -> Storage:
     kind: Storage = request.param
     return kind
 
@@ -41,7 +41,7 @@ def cloud_of(message: bytes, storage: Storage) -> CloudMessage:
 
 
 @pytest.fixture
-def rain_of_files(tmp_path: Path, run_derain) -> list[NDArray[np.bool_]]:
+def rain_of_files(tmp_path, run_derain) -> list[NDArray[np.bool_]]:
     """What the same method calls rain in the same scans as files."""
     folder = tmp_path / "files"
     folder.mkdir()
@@ -54,7 +54,7 @@ def rain_of_files(tmp_path: Path, run_derain) -> list[NDArray[np.bool_]]:
 
 
 def test_only_the_clouds_change_and_as_files_do(
-    tmp_path: Path, storage: Storage, run_derain, rain_of_files: list[NDArray[np.bool_]]
+    tmp_path, storage, run_derain, rain_of_files
 ) -> None:
     bag = small_bag(tmp_path, storage)
     for _ in range(2):  # the second time in place of an earlier bag
@@ -79,9 +79,7 @@ def test_only_the_clouds_change_and_as_files_do(
         assert (now.head, now.cloud.fields) == (was.head, was.cloud.fields)
 
 
-def test_what_was_removed_can_be_kept(
-    tmp_path: Path, storage: Storage, run_derain, rain_of_files: list[NDArray[np.bool_]]
-) -> None:
+def test_what_was_removed_can_be_kept(tmp_path, storage, run_derain, rain_of_files) -> None:
     bag = small_bag(tmp_path, storage)
     topic = ("--cleaned-topic", "/points_clean", "--removed-topic", "/rain")
     assert run_derain(*RUN, bag, "--out", tmp_path / "out", *topic).code == 0
@@ -99,7 +97,7 @@ def test_what_was_removed_can_be_kept(
             np.testing.assert_array_equal(columns["x"], table["x"][rain == bool(value)])
 
 
-def test_points_can_say_how_probably_they_are_rain(tmp_path: Path, run_derain) -> None:
+def test_points_can_say_how_probably_they_are_rain(tmp_path, run_derain) -> None:
     columns = {name: tables(1)[0][name] for name in ("x", "y", "z", "intensity")}
     taken = table_of({**columns, "rain_probability": np.zeros(300, np.uint16)})
     bag = small_bag(tmp_path, "mcap", clouds=[*tables(), taken])
@@ -116,9 +114,7 @@ def test_points_can_say_how_probably_they_are_rain(tmp_path: Path, run_derain) -
         np.testing.assert_array_equal(written, probability[~rain].astype(np.float32))
 
 
-def test_an_organised_cloud_can_keep_its_shape(
-    tmp_path: Path, run_derain, rain_of_files: list[NDArray[np.bool_]]
-) -> None:
+def test_an_organised_cloud_can_keep_its_shape(tmp_path, run_derain, rain_of_files) -> None:
     cloud = Ros("mcap").cloud(tables()[0], START, shape=(10, 30))
     bag = small_bag(tmp_path, "mcap", clouds=[], more=[Recorded(POINTS, CLOUD_TYPE, START, cloud)])
     shapes = []
@@ -131,7 +127,7 @@ def test_an_organised_cloud_can_keep_its_shape(
     assert shapes == [(1, clean, clean), (10, 30, clean)]
 
 
-def test_a_cloud_that_cannot_be_cleaned_stays_and_is_told(tmp_path: Path, run_derain) -> None:
+def test_a_cloud_that_cannot_be_cleaned_stays_and_is_told(tmp_path, run_derain) -> None:
     first, far, last = tables(3)
     far["x"] *= 1000  # no point has a neighbour
     lost, empty = np.ones(4, [("a", "f4")]), last[:0]
@@ -148,9 +144,7 @@ def test_a_cloud_that_cannot_be_cleaned_stays_and_is_told(tmp_path: Path, run_de
     assert [b == a for b, a in clouds] == [False, True, True, True, False]
 
 
-def test_nothing_is_left_of_a_bag_that_breaks_off(
-    tmp_path: Path, run_derain, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_nothing_is_left_of_a_bag_that_breaks_off(tmp_path, run_derain, monkeypatch) -> None:
     from rosbags import rosbag2
 
     bag = small_bag(tmp_path, "sqlite3")
@@ -169,7 +163,7 @@ def test_nothing_is_left_of_a_bag_that_breaks_off(
     assert os.listdir(tmp_path / "out") == []
 
 
-def test_several_bags_and_scans_are_cleaned_in_one_run(tmp_path: Path, run_derain) -> None:
+def test_several_bags_and_scans_are_cleaned_in_one_run(tmp_path, run_derain) -> None:
     """And one cloud of a bag as a file."""
     bags = [small_bag(tmp_path, "mcap", "a"), small_bag(tmp_path, "ros1", "b")]
     cloud = small_bag(tmp_path, "mcap", "c") / "000001"
@@ -187,7 +181,7 @@ def test_several_bags_and_scans_are_cleaned_in_one_run(tmp_path: Path, run_derai
      ("sqlite3", "file"), ("ros1", "bz2"), ("ros1", "lz4")],
 )  # fmt: skip
 def test_compressed_bags_are_read_and_stay_compressed(
-    tmp_path: Path, run_derain, compression: tuple[Storage, str], monkeypatch: pytest.MonkeyPatch
+    tmp_path, run_derain, compression, monkeypatch
 ) -> None:
     from rosbags import rosbag1, rosbag2
 
@@ -223,7 +217,7 @@ def test_compressed_bags_are_read_and_stay_compressed(
     assert storage_file(made).stat().st_size < 1.5 * storage_file(bag).stat().st_size
 
 
-def test_topics_without_definition_or_hash_are_copied(tmp_path: Path, run_derain) -> None:
+def test_topics_without_definition_or_hash_are_copied(tmp_path, run_derain) -> None:
     """As ROS 2 before Iron records them, in a database without definitions."""
     import sqlite3
 
@@ -259,7 +253,7 @@ NAMES = ["a b", "/a\nb", "/a//b", "/é", ""]  # that no topic may have
     ],
 )
 def test_what_cannot_be_written_is_refused_before_any_work(
-    tmp_path: Path, run_derain, out: str, options: tuple[str, ...], reason: str
+    tmp_path, run_derain, out, options, reason
 ) -> None:
     bag = small_bag(tmp_path, "mcap")
     (tmp_path / "mine/drive").mkdir(parents=True)
@@ -272,7 +266,7 @@ def test_what_cannot_be_written_is_refused_before_any_work(
 
 
 def test_bags_of_one_name_in_a_folder_of_recordings_are_written_apart(
-    tmp_path: Path, storage: Storage, run_derain
+    tmp_path, storage, run_derain
 ) -> None:
     for name in ("a", "b"):
         (tmp_path / "fleet" / name).mkdir(parents=True)
@@ -288,7 +282,7 @@ def test_bags_of_one_name_in_a_folder_of_recordings_are_written_apart(
 
 
 def test_a_bag_is_not_written_over_the_results_of_a_folder_of_its_name(
-    tmp_path: Path, run_derain
+    tmp_path, run_derain
 ) -> None:
     fleet = tmp_path / "fleet/2024"
     (fleet / "drive").mkdir(parents=True)

@@ -39,9 +39,7 @@ def record(unit: str, *scans: tuple[float | None, int]) -> Record:
         ("a/000000", float("nan"), "a, without times"),
     ],
 )
-def test_hours_are_named_by_their_date_or_recording(
-    unit: str, seconds: float | None, named: str
-) -> None:
+def test_hours_are_named_by_their_date_or_recording(unit, seconds, named) -> None:
     totals = CleanedTotals()
     totals.add(record(unit, (seconds, 50)))
     assert list(totals.by_hour) == [named]

@@ -33,7 +33,7 @@ class Recorder(CleaningObserver):
 
 
 @pytest.fixture
-def scans(tmp_path: Path) -> Path:
+def scans(tmp_path) -> Path:
     """Two scans, and between them a file that is none."""
     for number in (0, 2):
         scene(200, seed=number).tofile(tmp_path / f"{number}.bin")
@@ -41,7 +41,7 @@ def scans(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_a_scan_that_cannot_be_read_is_reported_and_the_others_are_cleaned(scans: Path) -> None:
+def test_a_scan_that_cannot_be_read_is_reported_and_the_others_are_cleaned(scans) -> None:
     recorder, out = Recorder(), scans / "out"
     report = derain.clean(scans, DROR, out, most_removed=1, observer=recorder)
     assert recorder.calls == [
@@ -57,13 +57,13 @@ def test_a_scan_that_cannot_be_read_is_reported_and_the_others_are_cleaned(scans
         assert (scan.rain, len(derain.read_scan(out / path.name))) == (rain.sum(), 200 - rain.sum())
 
 
-def test_a_scan_with_too_much_rain_is_not_written(scans: Path) -> None:
+def test_a_scan_with_too_much_rain_is_not_written(scans) -> None:
     report = derain.clean(scans / "0.bin", DROR, scans / "out", most_removed=0)
     assert (len(report.scans), len(report.failures)) == (0, 1)
     assert not (scans / "out").exists()
 
 
-def test_the_weather_of_every_scan_is_measured_where_it_is_asked_for(scans: Path) -> None:
+def test_the_weather_of_every_scan_is_measured_where_it_is_asked_for(scans) -> None:
     files = [scans / "0.bin", scans / "2.bin"]
     sampled, every = (
         derain.clean(files, DROR, scans / "out", most_removed=1, weather=WeatherOptions(asked))

@@ -29,7 +29,7 @@ def touch(*paths: Path) -> None:
 
 
 @pytest.fixture
-def wads(tmp_path: Path) -> Path:
+def wads(tmp_path) -> Path:
     """A data set of two sequences of two scans each, and one that is not finished."""
     root = tmp_path / "WADS"
     for name in ("11", "02", ".03"):
@@ -39,7 +39,7 @@ def wads(tmp_path: Path) -> Path:
     return root
 
 
-def test_scans_and_folders_come_in_the_order_they_are_named(tmp_path: Path) -> None:
+def test_scans_and_folders_come_in_the_order_they_are_named(tmp_path) -> None:
     touch(tmp_path / "b/2.bin", tmp_path / "b/1.pcd", tmp_path / "b/.0.bin", tmp_path / "a.bin")
     frames = named_frames([tmp_path / "b", tmp_path / "a.bin"])
     assert [frame.key for frame in frames] == ["1", "2", "a"]
@@ -49,7 +49,7 @@ def test_scans_and_folders_come_in_the_order_they_are_named(tmp_path: Path) -> N
     assert not any(frame.has_labels or frame.label_path for frame in frames)
 
 
-def test_a_data_set_is_its_sequences(wads: Path) -> None:
+def test_a_data_set_is_its_sequences(wads) -> None:
     for named in (wads, wads / "sequences"):
         frames = named_frames([named])
         assert [frame.key for frame in frames] == [
@@ -60,7 +60,7 @@ def test_a_data_set_is_its_sequences(wads: Path) -> None:
         assert [frame.number for frame in frames] == [0, 1, 0, 1]
 
 
-def test_one_sequence_has_plain_names(wads: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_sequence_has_plain_names(wads, monkeypatch) -> None:
     for named in (wads / "sequences/02", wads / "sequences/02/velodyne"):
         frames = named_frames([named])
         assert [frame.key for frame in frames] == ["000000", "000001"]
@@ -70,9 +70,7 @@ def test_one_sequence_has_plain_names(wads: Path, monkeypatch: pytest.MonkeyPatc
     assert {frame.sequence for frame in named_frames([Path()])} == {"02"}
 
 
-def test_several_data_sets_and_scans_keep_apart(
-    wads: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_several_data_sets_and_scans_keep_apart(wads, tmp_path, monkeypatch) -> None:
     touch(tmp_path / "000000.bin")
     monkeypatch.chdir(tmp_path)
     frames = named_frames([wads, Path("000000.bin")])  # one path whole, one from here
@@ -80,7 +78,7 @@ def test_several_data_sets_and_scans_keep_apart(
     assert max(Counter(frame.key for frame in frames).values()) == 1
 
 
-def test_scans_beside_folders_of_scans_are_what_is_meant(tmp_path: Path) -> None:
+def test_scans_beside_folders_of_scans_are_what_is_meant(tmp_path) -> None:
     touch(tmp_path / "own.bin", tmp_path / "velodyne/0.bin", tmp_path / "texts/scan.csv")
     for named in (tmp_path, str(tmp_path), [str(tmp_path)]):
         assert [frame.key for frame in named_frames(named)] == ["own"]
@@ -89,9 +87,7 @@ def test_scans_beside_folders_of_scans_are_what_is_meant(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("folder", ["", "sequences/00/velodyne", "sequences/01/velodyne"])
-def test_what_is_passed_over_in_a_folder_is_counted_once(
-    tmp_path: Path, folder: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_passed_over_in_a_folder_is_counted_once(tmp_path, folder, capsys) -> None:
     place = tmp_path / folder
     touch(*(place / name for name in ("0.bin", "1.csv", "2.csv.gz", "3.txt", "4.mcap", "5.BAG")))
     # Labels, records of the scans, and what no format reads.
@@ -103,16 +99,14 @@ def test_what_is_passed_over_in_a_folder_is_counted_once(
     assert f"{place}: 1 .bag, 2 .csv, 1 .mcap, 1 .txt passed over" in warning
 
 
-def test_nothing_is_said_of_a_folder_whose_scans_are_all_taken(
-    tmp_path: Path, wads: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_nothing_is_said_of_a_folder_whose_scans_are_all_taken(tmp_path, wads, capsys) -> None:
     touch(tmp_path / "texts/0.csv", tmp_path / "texts/times.txt", tmp_path / "texts/0.txt.label")
     named_frames([wads, tmp_path / "texts", tmp_path / "texts/0.csv"])
     assert capsys.readouterr().err == ""
 
 
 @pytest.mark.parametrize("layout", [Layout(), REHEARSE3D, DRIVES])
-def test_labels_lie_where_the_layout_says(tmp_path: Path, layout: Layout) -> None:
+def test_labels_lie_where_the_layout_says(tmp_path, layout) -> None:
     sequence = tmp_path / layout.sequences / "7"
     touch(sequence / layout.scans / "3.bin.gz", sequence / layout.labels / "3.label")
     (frame,) = sequence_frames([sequence], layout)
@@ -126,21 +120,21 @@ def test_labels_lie_where_the_layout_says(tmp_path: Path, layout: Layout) -> Non
 
 
 @pytest.mark.parametrize("root", ["", "drives", "drives/1", "drives/1/lidar"])
-def test_a_layout_is_known_from_the_root_to_the_scans(tmp_path: Path, root: str) -> None:
+def test_a_layout_is_known_from_the_root_to_the_scans(tmp_path, root) -> None:
     touch(tmp_path / "drives/1/lidar/0.bin", tmp_path / "drives/1/truth/0.label")
     assert find_layout(tmp_path / root) is None
     assert find_layout(tmp_path / root, [REHEARSE3D, DRIVES]) == DRIVES
     assert [frame.key for frame in named_frames([tmp_path / root], layouts=[DRIVES])] == ["0"]
 
 
-def test_names_of_folders_are_no_patterns(tmp_path: Path) -> None:
+def test_names_of_folders_are_no_patterns(tmp_path) -> None:
     odd = Layout(sequences="s*", scans="[lidar]", labels="?")
     touch(tmp_path / "s*/1/[lidar]/0.bin", tmp_path / "sx/2/l/0.bin")
     assert scan_folders(tmp_path, odd) == [tmp_path / "s*/1/[lidar]"]
 
 
 @pytest.mark.parametrize(("name", "reason"), [("none", "no such file or"), ("empty", "no scans")])
-def test_what_holds_nothing_is_refused(tmp_path: Path, name: str, reason: str) -> None:
+def test_what_holds_nothing_is_refused(tmp_path, name, reason) -> None:
     (tmp_path / "empty/velodyne").mkdir(parents=True)
     with pytest.raises(InputError, match=reason):
         named_frames([tmp_path / name])
@@ -152,7 +146,7 @@ NAMES = st.text(string.ascii_lowercase + "0.é", min_size=1, max_size=4).filter(
 
 
 @given(st.sets(st.lists(NAMES, min_size=1, max_size=4).map("/".join), min_size=1), st.booleans())
-def test_keys_are_unlike_one_another_and_lead_to_the_scans(paths: set[str], whole: bool) -> None:
+def test_keys_are_unlike_one_another_and_lead_to_the_scans(paths, whole) -> None:
     base = Path("/data" if whole else "data")
     scans = [base / f"{path}.bin" for path in paths]
     keys = relative_keys(scans)
@@ -163,7 +157,7 @@ def test_keys_are_unlike_one_another_and_lead_to_the_scans(paths: set[str], whol
     assert not any(Path(key).is_absolute() or ".." in Path(key).parts for key in keys)
 
 
-def test_scans_frames_and_paths_stand_in_the_order_they_are_given(tmp_path: Path) -> None:
+def test_scans_frames_and_paths_stand_in_the_order_they_are_given(tmp_path) -> None:
     for number in range(2):
         scene(10 + number).tofile(tmp_path / f"{number}.bin")
         write_labels(tmp_path / f"{number}.label", np.arange(10 + number))
@@ -177,13 +171,13 @@ def test_scans_frames_and_paths_stand_in_the_order_they_are_given(tmp_path: Path
     assert source_of(source) is source
 
 
-def test_wide_files_are_read_by_the_columns_that_are_named(tmp_path: Path) -> None:
+def test_wide_files_are_read_by_the_columns_that_are_named(tmp_path) -> None:
     np.zeros((7, 5), "<f4").tofile(tmp_path / "wide.bin")
     (frame,) = source_of(tmp_path / "wide.bin", ["x", "y", "z", "intensity", "ring"])
     assert len(frame.read()) == frame.count_points() == 7
 
 
-def test_what_is_no_scan_is_refused(tmp_path: Path) -> None:
+def test_what_is_no_scan_is_refused(tmp_path) -> None:
     with pytest.raises(InputError, match="scans: there are none"):
         source_of([])
     with pytest.raises(InputError, match="scans: dict is no scan"):
@@ -193,7 +187,7 @@ def test_what_is_no_scan_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.fixture
-def fleet(tmp_path: Path) -> Path:
+def fleet(tmp_path) -> Path:
     """A folder of recordings of all makes, beside what is none of them."""
     root = tmp_path / "fleet"
     touch(
@@ -216,7 +210,7 @@ FOUND = {
 }
 
 
-def test_a_folder_of_recordings_is_all_of_them(fleet: Path) -> None:
+def test_a_folder_of_recordings_is_all_of_them(fleet) -> None:
     frames = named_frames(fleet)
     keys = [f"{folder}/{scan}" for folder, scans in FOUND.items() for scan in scans]
     assert [frame.key for frame in frames] == keys
@@ -226,7 +220,7 @@ def test_a_folder_of_recordings_is_all_of_them(fleet: Path) -> None:
     assert [frame.name for frame in frames] == [frame.name for frame in one_by_one]
 
 
-def test_what_is_found_keeps_its_key_when_a_recording_is_added(fleet: Path) -> None:
+def test_what_is_found_keeps_its_key_when_a_recording_is_added(fleet) -> None:
     before = {frame.name: frame.key for frame in named_frames(fleet)}
     touch(fleet / "2023/c/0.bin", fleet / "2025/set/sequences/02/velodyne/7.bin", fleet / "d/0.npy")
     after = {frame.name: frame.key for frame in named_frames(fleet)}
@@ -234,12 +228,12 @@ def test_what_is_found_keeps_its_key_when_a_recording_is_added(fleet: Path) -> N
     assert after.items() > before.items()
 
 
-def test_one_sequence_is_no_folder_of_recordings_to_what_takes_no_data_sets(fleet: Path) -> None:
+def test_one_sequence_is_no_folder_of_recordings_to_what_takes_no_data_sets(fleet) -> None:
     with pytest.raises(InputError, match="no scans"):
         named_frames(fleet, layouts=())
 
 
-def test_results_among_the_recordings_are_passed_over(fleet: Path) -> None:
+def test_results_among_the_recordings_are_passed_over(fleet) -> None:
     before = [frame.key for frame in named_frames(fleet)]
     touch(fleet / "cleaned/2024/a/0.pcd", fleet / "link/0.pcd")  # of a run that kept no records
     (fleet / "to_results").symlink_to(fleet / "cleaned")
@@ -248,12 +242,12 @@ def test_results_among_the_recordings_are_passed_over(fleet: Path) -> None:
     assert len(named_frames(fleet)) == len(before) + 2
 
 
-def test_simulated_data_is_found_though_it_has_records(fleet: Path) -> None:
+def test_simulated_data_is_found_though_it_has_records(fleet) -> None:
     touch(fleet / "results/manifest.json")
     assert "results/0" in [frame.key for frame in named_frames(fleet)]
 
 
-def test_what_a_link_leads_to_is_found_once(tmp_path: Path) -> None:
+def test_what_a_link_leads_to_is_found_once(tmp_path) -> None:
     touch(tmp_path / "fleet/b/0.bin", tmp_path / "elsewhere/0.bin", tmp_path / "fleet/c/d/0.bin")
     (tmp_path / "fleet/a_latest").symlink_to(tmp_path / "fleet/b")
     (tmp_path / "fleet/a_other").symlink_to(tmp_path / "elsewhere")
@@ -266,16 +260,12 @@ def test_what_a_link_leads_to_is_found_once(tmp_path: Path) -> None:
     ]
 
 
-def test_scans_beside_folders_of_scans_hide_none_below_a_folder_of_recordings(
-    tmp_path: Path,
-) -> None:
+def test_scans_beside_folders_of_scans_hide_none_below_a_folder_of_recordings(tmp_path) -> None:
     touch(tmp_path / "fleet/day/map.npy", tmp_path / "fleet/day/a/0.bin")
     assert [frame.key for frame in named_frames(tmp_path / "fleet")] == ["day/map", "day/a/0"]
 
 
-def test_what_was_named_by_itself_is_no_folder_of_recordings(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_was_named_by_itself_is_no_folder_of_recordings(tmp_path, monkeypatch, capsys) -> None:
     touch(tmp_path / "set/velodyne/0.bin", tmp_path / "set/velodyne/1.bin")
     touch(tmp_path / "sets/a/velodyne/0.bin", tmp_path / "sets/other/0.bin")
     touch(tmp_path / "sets/.hidden/0.bin", tmp_path / "sets/broken/drive.bag.active")
@@ -288,9 +278,7 @@ def test_what_was_named_by_itself_is_no_folder_of_recordings(
     assert "drive.bag.active" in warned
 
 
-def test_a_recording_that_cannot_be_read_is_passed_over_with_a_warning(
-    fleet: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_recording_that_cannot_be_read_is_passed_over_with_a_warning(fleet, capsys) -> None:
     before = [frame.key for frame in named_frames(fleet)]
     touch(fleet / "2026/drive.bag.active")
     assert [frame.key for frame in named_frames(fleet)] == before

@@ -21,7 +21,7 @@ from derain.sources.source import Frames
 
 
 @pytest.fixture
-def labelled(tmp_path: Path) -> FileFrame:
+def labelled(tmp_path) -> FileFrame:
     """A scan of 50 points with labels beside it, those of ten of them 110."""
     scene(50).tofile(tmp_path / "scan.bin")
     write_labels(tmp_path / "scan.label", np.where(np.arange(50) < 10, 110, 0), np.arange(50))
@@ -29,13 +29,13 @@ def labelled(tmp_path: Path) -> FileFrame:
 
 
 @pytest.mark.parametrize("name", ["scan.bin", "scan.pcd", "SCAN.BIN.GZ", "1.5.ply", "scan.npz"])
-def test_key_and_suffix_make_the_name_of_the_file(name: str) -> None:
+def test_key_and_suffix_make_the_name_of_the_file(name) -> None:
     frame = frame_of(Path("folder") / name)
     assert frame.key + frame.suffix == name
     assert frame.name == str(Path("folder") / name)
 
 
-def test_a_file_is_read_when_it_is_told_to(labelled: FileFrame) -> None:
+def test_a_file_is_read_when_it_is_told_to(labelled) -> None:
     np.testing.assert_array_equal(labelled.read().xyz, scene(50)[:, :3])
     assert labelled.read().label is None
     assert labelled.has_labels
@@ -46,7 +46,7 @@ def test_a_file_is_read_when_it_is_told_to(labelled: FileFrame) -> None:
         frame_of(Path("nowhere.bin")).read()
 
 
-def test_labels_that_nobody_reads_are_not_there(labelled: FileFrame) -> None:
+def test_labels_that_nobody_reads_are_not_there(labelled) -> None:
     bare = labelled.without_labels()
     assert not bare.has_labels
     assert bare.checksums() == (labelled.checksums()[0], None)
@@ -54,14 +54,14 @@ def test_labels_that_nobody_reads_are_not_there(labelled: FileFrame) -> None:
         bare.read_label(50)
 
 
-def test_labels_that_the_card_does_not_know_are_named(labelled: FileFrame) -> None:
+def test_labels_that_the_card_does_not_know_are_named(labelled) -> None:
     scan = FrameReader(load_card("wads")).read(labelled)
     assert (scan.label == 110).sum() == 10
     with pytest.raises(InputError, match=r"scan\.label: ids \[110\] are no classes of REHEARSE-3D"):
         FrameReader(load_card("rehearse3d")).read(labelled)
 
 
-def test_intensities_are_seen_in_another_unit_and_kept_as_they_are(labelled: FileFrame) -> None:
+def test_intensities_are_seen_in_another_unit_and_kept_as_they_are(labelled) -> None:
     memory = MemoryFrame(key="0", scan=labelled.read())
     for frame in (labelled, memory):
         scan = frame.with_intensity_times(2).with_intensity_times(3).read()
@@ -70,7 +70,7 @@ def test_intensities_are_seen_in_another_unit_and_kept_as_they_are(labelled: Fil
         assert frame.read().intensity[0] == scene(50)[0, 3]
 
 
-def test_a_fingerprint_tells_files_apart_by_their_ends(tmp_path: Path) -> None:
+def test_a_fingerprint_tells_files_apart_by_their_ends(tmp_path) -> None:
     long = np.zeros(2**18, np.uint8)
     contents = {"same": long, "first": long.copy(), "last": long.copy(), "longer": np.zeros(2**19)}
     contents["first"][0] = contents["last"][-1] = 1
@@ -84,14 +84,14 @@ def test_a_fingerprint_tells_files_apart_by_their_ends(tmp_path: Path) -> None:
     assert frame_of(tmp_path / "copy.bin").fingerprint() in prints
 
 
-def test_checksums_are_those_that_everybody_computes(labelled: FileFrame, tmp_path: Path) -> None:
+def test_checksums_are_those_that_everybody_computes(labelled, tmp_path) -> None:
     names = ("scan.bin", "scan.label")
     assert labelled.checksums() == tuple(
         sha256((tmp_path / name).read_bytes()).hexdigest() for name in names
     )
 
 
-def test_a_given_pose_goes_before_the_record_beside_the_scan(labelled: FileFrame) -> None:
+def test_a_given_pose_goes_before_the_record_beside_the_scan(labelled) -> None:
     (labelled.path.parent / "poses.txt").write_text("damaged")
     pose = np.eye(4)
     assert labelled.with_pose(pose).pose is pose
@@ -99,7 +99,7 @@ def test_a_given_pose_goes_before_the_record_beside_the_scan(labelled: FileFrame
         labelled.pose  # noqa: B018
 
 
-def test_a_scan_in_memory_is_a_frame_like_any(labelled: FileFrame) -> None:
+def test_a_scan_in_memory_is_a_frame_like_any(labelled) -> None:
     scan = Scan.of(scene(50), "mine").with_label(labelled.read_label(50))
     frame = MemoryFrame(key="0", scan=scan, seconds=1.5)
     assert (frame.name, frame.suffix, frame.time, frame.count_points()) == ("mine", "", 1.5, 50)

@@ -35,9 +35,7 @@ def seen(given: FrameInWindow) -> tuple[list[float | None], ...]:
     before=st.integers(0, 3),
     after=st.integers(0, 3),
 )
-def test_windows_are_those_of_the_whole_recording(
-    lengths: list[int], before: int, after: int
-) -> None:
+def test_windows_are_those_of_the_whole_recording(lengths, before, after) -> None:
     recent = RecentFrames(Window(before, after))
     found = []
     for frame in frames(*lengths):
@@ -67,7 +65,7 @@ def test_nothing_is_kept_that_no_window_asks_for() -> None:
 
 
 @pytest.mark.parametrize("number", [0, 3, 5])
-def test_a_gap_starts_anew(number: int) -> None:
+def test_a_gap_starts_anew(number) -> None:
     recent = RecentFrames(Window(1, 1))
     all_of_them = frames(10)
     recent.push(all_of_them[2], PlacedScan(SCAN, all_of_them[2].time))

@@ -1,8 +1,5 @@
 """Frames by recordings, and what of a recording does not suit a method of several scans."""
 
-from collections.abc import Sequence
-from pathlib import Path
-
 import pytest
 
 from derain.evaluation.hard_cases import scene
@@ -42,7 +39,7 @@ def test_a_recording_ends_where_a_frame_does_not_follow() -> None:
         ((0.0,), ["1 scan in its recording"]),
     ],
 )
-def test_what_does_not_suit_is_told(seconds: Sequence[float | None], told: list[str]) -> None:
+def test_what_does_not_suit_is_told(seconds, told) -> None:
     sentences = list(irregularities(frames(*seconds), SEVERAL))
     assert len(sentences) == len(told)
     for sentence, part in zip(sentences, told, strict=True):
@@ -59,7 +56,7 @@ def test_what_does_not_suit_is_told(seconds: Sequence[float | None], told: list[
         ((), []),
     ],
 )
-def test_times_break_a_recording(seconds: Sequence[float | None], lengths: list[int]) -> None:
+def test_times_break_a_recording(seconds, lengths) -> None:
     assert [len(part) for part in unbroken_recordings(frames(*seconds))] == lengths
 
 
@@ -73,14 +70,14 @@ def test_times_break_a_recording(seconds: Sequence[float | None], lengths: list[
     ],
 )
 def test_names_that_are_numbers_break_a_recording_where_no_times_do(
-    tmp_path: Path, names: Sequence[str], lengths: list[int]
+    tmp_path, names, lengths
 ) -> None:
     for name in names:
         scene(10).tofile(tmp_path / f"{name}.bin")
     assert [len(part) for part in unbroken_recordings(named_frames([tmp_path]))] == lengths
 
 
-def test_names_that_are_numbers_tell_the_order_where_no_times_do(tmp_path: Path) -> None:
+def test_names_that_are_numbers_tell_the_order_where_no_times_do(tmp_path) -> None:
     for number in range(4):
         scene(10).tofile(tmp_path / f"{number:03d}.bin")
     inorder = [tmp_path / f"{number:03d}.bin" for number in range(4)]
@@ -90,7 +87,7 @@ def test_names_that_are_numbers_tell_the_order_where_no_times_do(tmp_path: Path)
     assert "002.bin: not later than the scan before it (3 scans in all)" in sentence
 
 
-def test_damaged_times_are_told_and_no_more(tmp_path: Path) -> None:
+def test_damaged_times_are_told_and_no_more(tmp_path) -> None:
     for number in range(3):
         scene(10).tofile(tmp_path / f"{number}.bin")
     (tmp_path / "times.txt").write_text("soon\n")

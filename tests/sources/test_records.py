@@ -15,7 +15,7 @@ def line(matrix: np.ndarray) -> str:
 
 
 @pytest.fixture
-def sequence(tmp_path: Path) -> Path:
+def sequence(tmp_path) -> Path:
     """A sequence of three scans, which nobody reads."""
     folder = tmp_path / "sequences/00/velodyne"
     folder.mkdir(parents=True)
@@ -32,26 +32,26 @@ def records(sequence: Path) -> Records:
     return Records(sequence / "velodyne")
 
 
-def test_nothing_is_known_where_nothing_says_it(sequence: Path) -> None:
+def test_nothing_is_known_where_nothing_says_it(sequence) -> None:
     assert records(sequence).time_of(scan(sequence)) is None
     assert records(sequence).pose_of(scan(sequence)) is None
 
 
 @pytest.mark.parametrize("folder", ["", "velodyne"])
-def test_times_lie_above_the_scans_or_beside_them(sequence: Path, folder: str) -> None:
+def test_times_lie_above_the_scans_or_beside_them(sequence, folder) -> None:
     (sequence / folder / "times.txt").write_text("0.0\n1.036e-01\n\n2.0e-1\n")
     found = records(sequence)
     assert [found.time_of(scan(sequence, number)) for number in range(3)] == [0, 0.1036, 0.2]
 
 
-def test_times_of_the_metadata_go_by_name(sequence: Path) -> None:
+def test_times_of_the_metadata_go_by_name(sequence) -> None:
     text = "frame,timestamp\n000002,7.5\n0,5.5\n000001.bin,6.5\n"
     (sequence / "velodyne/metadata.csv").write_text(text)
     found = records(sequence)
     assert [found.time_of(scan(sequence, number)) for number in range(3)] == [5.5, 6.5, 7.5]
 
 
-def test_poses_by_time_go_to_the_scans_by_their_times(sequence: Path) -> None:
+def test_poses_by_time_go_to_the_scans_by_their_times(sequence) -> None:
     (sequence / "times.txt").write_text("10.0\n10.1\n10.2\n")
     (sequence / "poses.txt").write_text("9.9 0 0 0 0 0 0 1\n10.3 4 0 0 0 0 0 1\n")
     found = records(sequence)
@@ -60,9 +60,7 @@ def test_poses_by_time_go_to_the_scans_by_their_times(sequence: Path) -> None:
 
 
 @pytest.mark.parametrize("times", [None, "1700000000\n1700000001\n1700000002\n"])
-def test_poses_by_a_time_that_the_scans_do_not_know_go_line_by_line(
-    sequence: Path, times: str | None
-) -> None:
+def test_poses_by_a_time_that_the_scans_do_not_know_go_line_by_line(sequence, times) -> None:
     if times is not None:
         (sequence / "times.txt").write_text(times)
     lines = [f"{number} {number} 0 0 0 0 0 1" for number in range(3)]
@@ -71,7 +69,7 @@ def test_poses_by_a_time_that_the_scans_do_not_know_go_line_by_line(
     assert [found.pose_of(scan(sequence, number))[0, 3] for number in range(3)] == [0, 1, 2]
 
 
-def test_of_a_partial_copy_each_scan_keeps_its_line(sequence: Path) -> None:
+def test_of_a_partial_copy_each_scan_keeps_its_line(sequence) -> None:
     (sequence / "times.txt").write_text("".join(f"{number / 10}\n" for number in range(50)))
     scan(sequence, 42).touch()
     scan(sequence, 0).unlink()
@@ -80,7 +78,7 @@ def test_of_a_partial_copy_each_scan_keeps_its_line(sequence: Path) -> None:
     assert found.time_of(scan(sequence, 1)) == 0.1
 
 
-def test_scans_whose_names_are_no_numbers_go_by_their_order(sequence: Path) -> None:
+def test_scans_whose_names_are_no_numbers_go_by_their_order(sequence) -> None:
     for number, name in enumerate(("a", "b", "c")):
         scan(sequence, number).rename(sequence / f"velodyne/{name}.bin")
     (sequence / "times.txt").write_text("1\n2\n3\n")
@@ -102,9 +100,7 @@ def test_scans_whose_names_are_no_numbers_go_by_their_order(sequence: Path) -> N
         ("calib.txt", b"P0: 1\nTr: 1 2 3\n", "line 2 is not 12 numbers"),
     ],
 )
-def test_damage_is_one_error_that_names_file_and_line(
-    sequence: Path, name: str, content: bytes, reason: str
-) -> None:
+def test_damage_is_one_error_that_names_file_and_line(sequence, name, content, reason) -> None:
     if name == "calib.txt":
         (sequence / "poses.txt").write_text("\n".join(3 * [line(np.eye(4))]))
     (sequence / name).write_bytes(content)
@@ -117,7 +113,7 @@ def test_damage_is_one_error_that_names_file_and_line(
     assert error.value.remedy
 
 
-def test_records_cross_to_other_processes(sequence: Path) -> None:
+def test_records_cross_to_other_processes(sequence) -> None:
     (sequence / "times.txt").write_text("1\n2\n3\n")
     found = records(sequence)
     assert pickle.loads(pickle.dumps(found)).time_of(scan(sequence, 1)) == 2
@@ -126,7 +122,7 @@ def test_records_cross_to_other_processes(sequence: Path) -> None:
     assert pickle.loads(pickle.dumps(found)).time_of(scan(sequence, 1)) == 2  # as it was read
 
 
-def test_one_damaged_record_does_not_touch_the_other(sequence: Path) -> None:
+def test_one_damaged_record_does_not_touch_the_other(sequence) -> None:
     (sequence / "times.txt").write_text("1\n2\n3\n")
     (sequence / "poses.txt").write_text("damaged")
     assert records(sequence).time_of(scan(sequence)) == 1

@@ -15,7 +15,6 @@ from derain.filters import DROR, FilterDerainer
 from derain.recordings.persistence import PersistenceDerainer
 from derain.scan import Scan
 from derain.sources.judgement import Judgement
-from derain.sources.method import Method
 from derain.views.scan_issues import ScanIssue
 
 
@@ -38,7 +37,7 @@ def in_millimetres() -> NDArray[np.float32]:
     [Derainer, lambda: FilterDerainer(DROR()), PersistenceDerainer],
     ids=["model", "filter", "persistence"],
 )
-def test_every_kind_of_method_warns_of_another_unit_once(make: Callable[[], Method]) -> None:
+def test_every_kind_of_method_warns_of_another_unit_once(make) -> None:
     method, points = make(), in_millimetres()
 
     def push() -> None:

@@ -26,7 +26,7 @@ def names(folder: Path) -> list[str]:
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
 
 
-def test_a_scan_and_its_labels_are_named_by_the_key(tmp_path: Path) -> None:
+def test_a_scan_and_its_labels_are_named_by_the_key(tmp_path) -> None:
     write(tmp_path / "scans/1.bin")
     (frame,) = named_frames([tmp_path / "scans"])
     sink, rain = FolderSink(tmp_path / "out"), np.arange(30) < 4
@@ -36,7 +36,7 @@ def test_a_scan_and_its_labels_are_named_by_the_key(tmp_path: Path) -> None:
     assert (tmp_path / "out/1.bin").read_bytes() == scene(30)[4:].tobytes()
 
 
-def test_a_scan_from_memory_is_written_as_a_pcd(tmp_path: Path) -> None:
+def test_a_scan_from_memory_is_written_as_a_pcd(tmp_path) -> None:
     (frame,) = Frames.of_scans([Scan.of(scene(30))])
     scan, sink = frame.read(), FolderSink(tmp_path)
     sink.write(frame, scan, np.zeros(30, bool), scan)  # nobody asks for what is removed
@@ -44,7 +44,7 @@ def test_a_scan_from_memory_is_written_as_a_pcd(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_scan(tmp_path / "000000.pcd").xyz, scene(30)[:, :3])
 
 
-def test_without_its_scan_there_are_no_labels(tmp_path: Path) -> None:
+def test_without_its_scan_there_are_no_labels(tmp_path) -> None:
     (tmp_path / "000000.pcd").mkdir()
     (frame,) = Frames.of_scans([Scan.of(scene(30))])
     with pytest.raises(InputError, match="is not a file that can be replaced"):
@@ -61,7 +61,7 @@ def test_without_its_scan_there_are_no_labels(tmp_path: Path) -> None:
         ("1/other/../labels", "holds the labels of"),
     ],
 )
-def test_neither_scans_nor_labels_are_overwritten(tmp_path: Path, out: str, reason: str) -> None:
+def test_neither_scans_nor_labels_are_overwritten(tmp_path, out, reason) -> None:
     write(tmp_path / "1/velodyne/0.bin")
     (tmp_path / "1/other").mkdir()
     for source in (named_frames([tmp_path / "1"]), named_frames([tmp_path / "1"], labelled=True)):
@@ -72,7 +72,7 @@ def test_neither_scans_nor_labels_are_overwritten(tmp_path: Path, out: str, reas
     FolderSink(tmp_path / "1/cleaned").refuse_clashes(source)
 
 
-def test_labels_that_lie_where_the_frame_says_are_not_overwritten(tmp_path: Path) -> None:
+def test_labels_that_lie_where_the_frame_says_are_not_overwritten(tmp_path) -> None:
     scan = tmp_path / "lidar/0.bin"
     write(scan)
     source = frames_of([scan], lambda scan: tmp_path / "truth/0.label", ("x", "y", "z", "i"))
@@ -80,14 +80,14 @@ def test_labels_that_lie_where_the_frame_says_are_not_overwritten(tmp_path: Path
         FolderSink(tmp_path / "truth").refuse_clashes(source)
 
 
-def test_a_link_to_the_scans_is_their_folder(tmp_path: Path) -> None:
+def test_a_link_to_the_scans_is_their_folder(tmp_path) -> None:
     write(tmp_path / "scans/0.bin")
     (tmp_path / "link").symlink_to(tmp_path / "scans", target_is_directory=True)
     with pytest.raises(InputError, match="would overwrite"):
         FolderSink(tmp_path / "link").refuse_clashes(named_frames([tmp_path / "scans"]))
 
 
-def test_two_scans_of_one_key_are_refused(tmp_path: Path) -> None:
+def test_two_scans_of_one_key_are_refused(tmp_path) -> None:
     write(tmp_path / "a/0.bin", tmp_path / "b/0.npy")
     source = named_frames([tmp_path / "a", tmp_path / "b/0.npy"])
     with pytest.raises(InputError, match="another scan has the same name") as error:
@@ -99,7 +99,7 @@ def test_two_scans_of_one_key_are_refused(tmp_path: Path) -> None:
             FolderSink(tmp_path / "out").refuse_clashes(scans)
 
 
-def test_one_scan_twice_is_refused_where_it_is_not_expected(tmp_path: Path) -> None:
+def test_one_scan_twice_is_refused_where_it_is_not_expected(tmp_path) -> None:
     write(tmp_path / "0.bin")
     twice = [frame_of(tmp_path / "0.bin"), frame_of(tmp_path / "0.bin")]
     FolderSink(tmp_path / "out").refuse_clashes(twice)
@@ -107,7 +107,7 @@ def test_one_scan_twice_is_refused_where_it_is_not_expected(tmp_path: Path) -> N
         FolderSink(tmp_path / "out", again=False).refuse_clashes(twice)
 
 
-def test_what_is_taken_away_goes_to_a_folder_of_its_own(tmp_path: Path) -> None:
+def test_what_is_taken_away_goes_to_a_folder_of_its_own(tmp_path) -> None:
     for sequence in "ab":
         write(tmp_path / f"data/sequences/{sequence}/velodyne/0.bin")
     source = named_frames([tmp_path / "data"])
@@ -121,7 +121,7 @@ def test_what_is_taken_away_goes_to_a_folder_of_its_own(tmp_path: Path) -> None:
     assert len(read_scan(tmp_path / "removed/b/velodyne/0.bin")) == 4
 
 
-def test_what_is_taken_away_is_refused_where_it_would_take_a_place(tmp_path: Path) -> None:
+def test_what_is_taken_away_is_refused_where_it_would_take_a_place(tmp_path) -> None:
     write(tmp_path / "scans/1.bin")
     source = named_frames([tmp_path / "scans"])
     out = tmp_path / "out"
@@ -142,7 +142,7 @@ def labelled(root: Path, *names: str, labels: str = "labels") -> Source:
 
 
 @pytest.mark.parametrize("own", ["a/0.label", "labels/0.label", "truth/0.label"])
-def test_labels_that_are_there_stay(tmp_path: Path, own: str) -> None:
+def test_labels_that_are_there_stay(tmp_path, own) -> None:
     frames = labelled(tmp_path, "a/0.bin", labels="truth")
     label = tmp_path / own
     label.parent.mkdir(parents=True)
@@ -153,9 +153,7 @@ def test_labels_that_are_there_stay(tmp_path: Path, own: str) -> None:
         sink.refuse_clashes(frames)
 
 
-def test_what_is_found_for_one_scan_is_not_written_over_the_labels_of_another(
-    tmp_path: Path,
-) -> None:
+def test_what_is_found_for_one_scan_is_not_written_over_the_labels_of_another(tmp_path) -> None:
     frames = labelled(tmp_path, "0.bin", "out/0.bin")
     (tmp_path / "out").mkdir()
     (tmp_path / "out/0.label").touch()

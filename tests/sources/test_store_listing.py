@@ -14,7 +14,7 @@ from derain.sources.stored_frame import StoredBag
 
 
 @pytest.fixture
-def drives(tmp_path: Path) -> Path:
+def drives(tmp_path) -> Path:
     """Two recordings, the first with times and poses, the second with damaged poses."""
     root = tmp_path / "drives"
     for name in ("10", "9"):
@@ -38,7 +38,7 @@ def stored(folder: Path) -> str:
     return "memory://bucket/drives"
 
 
-def test_scans_have_the_keys_times_and_poses_that_they_have_in_a_folder(drives: Path) -> None:
+def test_scans_have_the_keys_times_and_poses_that_they_have_in_a_folder(drives) -> None:
     near, far = derain.named_frames(drives), frames_at([stored(drives)])
     assert len(far) == 6
     for here, there in zip(near, far, strict=True):
@@ -51,7 +51,7 @@ def test_scans_have_the_keys_times_and_poses_that_they_have_in_a_folder(drives: 
         np.testing.assert_array_equal(here.pose, there.pose)
 
 
-def test_a_damaged_record_is_an_error_when_it_is_needed_and_names_its_url(drives: Path) -> None:
+def test_a_damaged_record_is_an_error_when_it_is_needed_and_names_its_url(drives) -> None:
     last = frames_at([stored(drives)])[-1]
     assert last.time is None
     with pytest.raises(InputError) as caught:
@@ -59,14 +59,14 @@ def test_a_damaged_record_is_an_error_when_it_is_needed_and_names_its_url(drives
     assert str(caught.value.subject) == "memory://bucket/drives/sequences/9/poses.txt"
 
 
-def test_a_damaged_scan_is_named_by_its_url(drives: Path) -> None:
+def test_a_damaged_scan_is_named_by_its_url(drives) -> None:
     (drives / "sequences/9/velodyne/11.bin").write_bytes(b"broken")
     with pytest.raises(InputError) as caught:
         frames_at([stored(drives)])[-2].read()
     assert str(caught.value.subject) == "memory://bucket/drives/sequences/9/velodyne/11.bin"
 
 
-def test_a_changed_record_changes_the_stamps_of_its_scans_alone(drives: Path) -> None:
+def test_a_changed_record_changes_the_stamps_of_its_scans_alone(drives) -> None:
     before = [frame.stamp() for frame in frames_at([stored(drives)])]
     memory = fsspec.filesystem("memory")
     memory.pipe("/bucket/drives/sequences/10/times.txt", b"1.1\n1.2\n1.3\n")
@@ -75,15 +75,13 @@ def test_a_changed_record_changes_the_stamps_of_its_scans_alone(drives: Path) ->
     assert before[3:] == after[3:]
 
 
-def test_what_is_passed_over_is_warned_of_by_its_url(
-    drives: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_passed_over_is_warned_of_by_its_url(drives, capsys) -> None:
     velodyne = f"{stored(drives)}/sequences/10/velodyne"
     frames_at([velodyne])
     assert f"{velodyne}: 1 .txt" in capsys.readouterr().err
 
 
-def test_a_bag_is_one_frame_with_all_of_its_files(tmp_path: Path) -> None:
+def test_a_bag_is_one_frame_with_all_of_its_files(tmp_path) -> None:
     small_bag(tmp_path / "bags", "mcap")
     (bag,) = frames_at([stored(tmp_path / "bags")], topic="/velodyne_points")
     assert isinstance(bag, StoredBag)
@@ -91,12 +89,12 @@ def test_a_bag_is_one_frame_with_all_of_its_files(tmp_path: Path) -> None:
     assert sorted(each.path.name for each in bag.objects) == ["drive.mcap", "metadata.yaml"]
 
 
-def test_paths_and_urls_are_not_mixed(drives: Path) -> None:
+def test_paths_and_urls_are_not_mixed(drives) -> None:
     with pytest.raises(InputError, match="two commands"):
         frames_at([stored(drives), drives])
 
 
-def test_a_folder_of_recordings_is_the_same_in_a_store(drives: Path) -> None:
+def test_a_folder_of_recordings_is_the_same_in_a_store(drives) -> None:
     root = drives / "sequences"
     for name in ("10", "9"):  # to be no data set
         (root / name / "velodyne").rename(root / name / "points")

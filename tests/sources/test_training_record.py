@@ -25,7 +25,7 @@ SPEC = ModelFile.read(Path(__file__).parents[1] / "export/kept/outdet.onnx").spe
 
 
 @pytest.fixture
-def scans(tmp_path: Path) -> Source:
+def scans(tmp_path) -> Source:
     """Two scans of a sequence and one of another, each of its own content."""
     paths = [tmp_path / f"sequences/{name}.bin" for name in ("11/v/a", "11/v/b", "12/v/a")]
     for number, path in enumerate(paths):
@@ -34,7 +34,7 @@ def scans(tmp_path: Path) -> Source:
     return named_frames(paths)
 
 
-def test_a_sequence_is_known_by_its_name_where_the_data_are_the_same(scans: Source) -> None:
+def test_a_sequence_is_known_by_its_name_where_the_data_are_the_same(scans) -> None:
     spec = replace(SPEC, training=record_of_sequences(["10", "11"]))
     note = training_overlap("mine", spec, CARD, scans)
     assert note is not None
@@ -45,7 +45,7 @@ def test_a_sequence_is_known_by_its_name_where_the_data_are_the_same(scans: Sour
     assert training_overlap("mine", replace(spec, data="other data"), CARD, scans) is None
 
 
-def test_a_scan_is_known_by_its_content_wherever_it_lies(scans: Source, tmp_path: Path) -> None:
+def test_a_scan_is_known_by_its_content_wherever_it_lies(scans, tmp_path) -> None:
     spec = replace(SPEC, training=record_of_scans(scans[:1]), data="whatever")
     moved = tmp_path / "elsewhere" / "other_name.bin"
     moved.parent.mkdir()
@@ -57,12 +57,12 @@ def test_a_scan_is_known_by_its_content_wherever_it_lies(scans: Source, tmp_path
     assert training_overlap("mine", spec, CARD, scans[1:]) is None
 
 
-def test_nothing_is_said_where_nothing_is_known(scans: Source) -> None:
+def test_nothing_is_said_where_nothing_is_known(scans) -> None:
     assert record_of_scans([]) == record_of_sequences([]) == {}
     assert training_overlap("mine", replace(SPEC, training={}), CARD, scans) is None
 
 
-def test_a_record_stays_small(scans: Source, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_record_stays_small(scans, monkeypatch) -> None:
     assert len(record_of_sequences(map(str, range(2 * MOST_NAMES)))["sequences"]) == MOST_NAMES
     monkeypatch.setattr("derain.sources.training_record.MOST_NAMES", 2)
     assert record_of_scans(scans) == {
@@ -71,7 +71,7 @@ def test_a_record_stays_small(scans: Source, monkeypatch: pytest.MonkeyPatch) ->
 
 
 @given(st.integers(0, 60), st.integers(1, 20))
-def test_items_are_spread_evenly_from_first_to_last(count: int, most: int) -> None:
+def test_items_are_spread_evenly_from_first_to_last(count, most) -> None:
     items = list(range(count))
     spaced = evenly_spaced(items, most)
     assert len(spaced) == min(count, most)

@@ -1,7 +1,5 @@
 """Poses in KITTI's and TUM's form: read, written, and told between the times that are known."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -36,7 +34,7 @@ def turned(yaw: float) -> np.ndarray:
 
 
 @given(motions)
-def test_a_quaternion_is_its_rotation(motion: np.ndarray) -> None:
+def test_a_quaternion_is_its_rotation(motion) -> None:
     quaternion = quaternion_of(motion[:3, :3])
     assert np.linalg.norm(quaternion) == pytest.approx(1)
     assert quaternion[3] >= 0
@@ -45,20 +43,13 @@ def test_a_quaternion_is_its_rotation(motion: np.ndarray) -> None:
 
 
 @given(degrees, st.floats(-170, 170), st.floats(0, 1))
-def test_on_the_way_between_two_turns_lies_their_share(
-    start: float, change: float, share: float
-) -> None:
+def test_on_the_way_between_two_turns_lies_their_share(start, change, share) -> None:
     found = slerp(quaternion_of(turned(start)), quaternion_of(turned(start + change)), share)
     np.testing.assert_allclose(rotation_of(found), turned(start + share * change), atol=1e-9)
 
 
 @given(poses=st.lists(motions, max_size=5), calibrated=st.booleans(), by_time=st.booleans())
-def test_what_is_written_is_read(
-    tmp_path_factory: pytest.TempPathFactory,
-    poses: list[np.ndarray],
-    calibrated: bool,
-    by_time: bool,
-) -> None:
+def test_what_is_written_is_read(tmp_path_factory, poses, calibrated, by_time) -> None:
     folder = tmp_path_factory.mktemp("poses")
     if calibrated:
         numbers = " ".join(map(str, TO_CAMERA[:3].ravel()))
@@ -84,7 +75,7 @@ def tum(*lines: str) -> str:
     return "# time x y z qx qy qz qw\n" + "".join(f"{line}\n" for line in lines)
 
 
-def test_poses_by_time_are_told_at_their_times_and_between_them(tmp_path: Path) -> None:
+def test_poses_by_time_are_told_at_their_times_and_between_them(tmp_path) -> None:
     half = np.sqrt(0.5)
     path = tmp_path / "drive.tum"
     path.write_text(tum("10.0 0 0 0 0 0 0 1", "", "10.5 2 4 6 0 0 -1.4142e0 1.4142e0"))
@@ -105,7 +96,7 @@ def test_poses_by_time_are_told_at_their_times_and_between_them(tmp_path: Path) 
 
 
 @pytest.mark.parametrize("time", [9.9, 10 + LONGEST_GAP, 14.1])
-def test_times_without_a_pose_are_refused(time: float) -> None:
+def test_times_without_a_pose_are_refused(time) -> None:
     times = np.array([10, 10 + 2 * LONGEST_GAP, 14])
     trajectory = Trajectory(np.tile(np.eye(4), (3, 1, 1)), times, "drive.tum")
     with pytest.raises(InputError, match=r"drive\.tum: has no pose for 7\.bin, which was taken at"):
@@ -123,14 +114,14 @@ def test_times_without_a_pose_are_refused(time: float) -> None:
         ("# 1 2 3\n\n1 2 3\n", "line 3 is not 12 numbers"),
     ],
 )
-def test_damage_is_told_with_its_line(tmp_path: Path, content: str, reason: str) -> None:
+def test_damage_is_told_with_its_line(tmp_path, content, reason) -> None:
     path = tmp_path / "drive.tum"
     path.write_text(content)
     with pytest.raises(InputError, match=reason):
         read_trajectory(path)
 
 
-def test_nothing_half_written_is_left(tmp_path: Path) -> None:
+def test_nothing_half_written_is_left(tmp_path) -> None:
     path = tmp_path / "poses.txt"
     path.write_text("as it was")
     (tmp_path / "calib.txt").write_text("damaged")

@@ -12,7 +12,6 @@ from small_bags import small_bag
 from window_method import Between
 
 import derain
-from benchmarks.recorded_bags import Storage
 from derain.evaluation.hard_cases import scene
 from derain.export.recorded import RecordedDerainer
 from derain.jobs.shard import Shard
@@ -34,7 +33,7 @@ SCANS = 7
 
 
 @pytest.fixture
-def drive(tmp_path: Path) -> Path:
+def drive(tmp_path) -> Path:
     """Two recordings with poses, in which scan 3 of the first cannot be read."""
     for place, name in enumerate(("first", "second")):
         folder = tmp_path / "drives" / "sequences" / name / "velodyne"
@@ -60,9 +59,7 @@ METHODS = {
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("block", [1, 2, 50])
-def test_the_union_of_units_is_what_one_run_gives(
-    drive: Path, tmp_path: Path, method: str, block: int
-) -> None:
+def test_the_union_of_units_is_what_one_run_gives(drive, tmp_path, method, block) -> None:
     source, every = derain.named_frames(drive), WeatherOptions(every_scan=True)
     reports = [
         derain.clean(
@@ -78,7 +75,7 @@ def test_the_union_of_units_is_what_one_run_gives(
 
 
 def test_shares_and_workers_give_the_same_and_a_last_run_finds_everything_done(
-    drive: Path, tmp_path: Path
+    drive, tmp_path
 ) -> None:
     method = derain.FilterDerainer(derain.DROR(), threads=1)
     (drive / "sequences/first/velodyne/000003.bin").unlink()
@@ -135,7 +132,7 @@ def standing() -> Source:
     delay=st.integers(0, 2),
 )
 def test_each_scan_of_a_unit_has_one_outcome_whichever_fail(
-    standing: Source, bad: frozenset[int], block: int, past: int, delay: int
+    standing, bad, block, past, delay
 ) -> None:
     method = Failing(past, delay, bad)
     for unit in units_of(standing, method, block):
@@ -149,7 +146,7 @@ def test_each_scan_of_a_unit_has_one_outcome_whichever_fail(
         assert failed == bad & {frame.number for frame in unit.frames}
 
 
-def test_odometry_in_units_is_that_of_the_whole_source(drive: Path, tmp_path: Path) -> None:
+def test_odometry_in_units_is_that_of_the_whole_source(drive, tmp_path) -> None:
     for poses in drive.rglob("poses.txt"):
         poses.unlink()
     source, method = derain.named_frames(drive), derain.PersistenceDerainer(threads=1)
@@ -175,7 +172,7 @@ def test_odometry_in_units_is_that_of_the_whole_source(drive: Path, tmp_path: Pa
         derain.clean(source, method, tmp_path / "units", weather=every, division=ungiven)
 
 
-def test_other_poses_are_other_inputs(drive: Path) -> None:
+def test_other_poses_are_other_inputs(drive) -> None:
     method = derain.PersistenceDerainer()
     source = derain.named_frames(drive)
 
@@ -195,7 +192,7 @@ def test_other_poses_are_other_inputs(drive: Path) -> None:
 
 
 @pytest.mark.parametrize("storage", ["mcap", "ros1"])
-def test_bags_in_units_are_those_of_one_run(tmp_path: Path, storage: Storage) -> None:
+def test_bags_in_units_are_those_of_one_run(tmp_path, storage) -> None:
     source = derain.named_frames(small_bag(tmp_path, storage))
     method = derain.FilterDerainer(derain.DROR(), threads=1)
     derain.clean(source, method, tmp_path / "whole", most_removed=1)
@@ -208,7 +205,7 @@ def test_bags_in_units_are_those_of_one_run(tmp_path: Path, storage: Storage) ->
     assert report.before == len(source)
 
 
-def test_ids_come_from_paths_and_not_from_what_else_is_there(drive: Path) -> None:
+def test_ids_come_from_paths_and_not_from_what_else_is_there(drive) -> None:
     method = derain.FilterDerainer(derain.DROR())
 
     def ids(source: Source) -> list[str]:
@@ -219,9 +216,7 @@ def test_ids_come_from_paths_and_not_from_what_else_is_there(drive: Path) -> Non
     assert ids(derain.Frames(source[SCANS:])) == ids(source)[3:]
 
 
-def test_a_changed_scan_is_done_again_with_the_blocks_that_see_it(
-    drive: Path, tmp_path: Path
-) -> None:
+def test_a_changed_scan_is_done_again_with_the_blocks_that_see_it(drive, tmp_path) -> None:
     (drive / "sequences/first/velodyne/000003.bin").unlink()
     method, division = derain.PersistenceDerainer(), Division(2, keep_records=True)
 
@@ -237,7 +232,7 @@ def test_a_changed_scan_is_done_again_with_the_blocks_that_see_it(
     assert again.before == len(again.scans) - 4
 
 
-def test_methods_that_find_poses_see_whole_recordings(drive: Path) -> None:
+def test_methods_that_find_poses_see_whole_recordings(drive) -> None:
     for poses in drive.rglob("poses.txt"):
         poses.unlink()
     source = derain.named_frames(drive)
@@ -246,7 +241,7 @@ def test_methods_that_find_poses_see_whole_recordings(drive: Path) -> None:
         assert [len(unit.frames) for unit in units_of(source, method, 2)] == [SCANS, SCANS]
 
 
-def test_a_bag_is_one_unit(tmp_path: Path) -> None:
+def test_a_bag_is_one_unit(tmp_path) -> None:
     source = derain.named_frames(small_bag(tmp_path, "mcap"))
     (unit,) = units_of(source, derain.FilterDerainer(derain.DROR()), block=1)
     assert (unit.id, len(unit.frames)) == (source[0].key, len(source))

@@ -45,7 +45,7 @@ class FailingStore(MemoryFileSystem):
 
 
 @pytest.fixture
-def store(monkeypatch: pytest.MonkeyPatch) -> Iterator[FailingStore]:
+def store(monkeypatch) -> Iterator[FailingStore]:
     """An empty store that works, and that is tried again at once where it is made to fail."""
     fsspec.register_implementation("failing", FailingStore, clobber=True)
     monkeypatch.setattr(FailingStore, "store", {})

@@ -11,7 +11,7 @@ from derain.stores.objects import StoredObject, fetch, listed, upload
 URL = "failing://bucket/drives"
 
 
-def test_what_is_uploaded_is_listed_and_fetched_though_requests_fail(store, tmp_path: Path) -> None:
+def test_what_is_uploaded_is_listed_and_fetched_though_requests_fail(store, tmp_path) -> None:
     store.faults.refuse, store.faults.cut = 4, 3
     written = {Path(f"{number % 2}/{number}.bin"): bytes([number]) * 9 for number in range(20)}
     for file, content in written.items():
@@ -35,7 +35,7 @@ def test_a_change_of_an_object_changes_its_version(store) -> None:
     assert before.version != after.version
 
 
-def test_a_read_that_never_comes_whole_is_an_error_with_both_sizes(store, tmp_path: Path) -> None:
+def test_a_read_that_never_comes_whole_is_an_error_with_both_sizes(store, tmp_path) -> None:
     store.pipe(f"{URL}/a.bin", b"12345")
     store.faults.cut = 1
     (stored,) = listed(f"{URL}/a.bin")
@@ -45,7 +45,7 @@ def test_a_read_that_never_comes_whole_is_an_error_with_both_sizes(store, tmp_pa
     assert store.faults.reads == len(objects.WAITS) + 1
 
 
-def test_what_is_not_there_is_not_asked_for_again(store, tmp_path: Path) -> None:
+def test_what_is_not_there_is_not_asked_for_again(store, tmp_path) -> None:
     with pytest.raises(InputError, match="no such object"):
         listed(URL)
     with pytest.raises(InputError, match="no such object"):
@@ -54,7 +54,7 @@ def test_what_is_not_there_is_not_asked_for_again(store, tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("scheme", ["failing", "nothing", "gs"])
-def test_errors_name_no_secrets(store, scheme: str) -> None:
+def test_errors_name_no_secrets(store, scheme) -> None:
     with pytest.raises(InputError) as caught:
         listed(f"{scheme}://me:pass-word@bucket/drives/a.bin?signature=sec-ret")
     for secret in ("me:", "pass-word", "sec-ret"):

@@ -9,7 +9,7 @@ from derain.stores.url import is_url, path_of, paths_of, place_of, url_of, witho
 
 
 @pytest.mark.parametrize("url", ["s3://bucket", "s3://bucket/drives/a b.bin", "https://host/a.bin"])
-def test_a_path_stands_for_each_url(url: str) -> None:
+def test_a_path_stands_for_each_url(url) -> None:
     path = path_of(url)
     assert not path.is_absolute()
     assert url_of(path) == url
@@ -17,7 +17,7 @@ def test_a_path_stands_for_each_url(url: str) -> None:
 
 
 @pytest.mark.parametrize("text", ["drives", "/drives", "C:/drives", "C:\\drives", "./a:b", "s3:/a"])
-def test_paths_of_this_machine_are_no_urls(text: str) -> None:
+def test_paths_of_this_machine_are_no_urls(text) -> None:
     assert not is_url(text)
     assert place_of(text) == Path(text)
 
@@ -29,12 +29,12 @@ def test_what_works_in_folders_alone_refuses_urls() -> None:
 
 
 @pytest.mark.parametrize("path", ["drives/a.bin", "/drives/s3:/a", "a:b/c"])
-def test_paths_of_this_machine_are_named_as_they_are(path: str) -> None:
+def test_paths_of_this_machine_are_named_as_they_are(path) -> None:
     assert url_of(Path(path)) == path
 
 
 @pytest.mark.parametrize("key", ["../../etc/passwd", "a/../../b", "a/./b", "a//b"])
-def test_keys_that_lead_elsewhere_are_refused(key: str) -> None:
+def test_keys_that_lead_elsewhere_are_refused(key) -> None:
     with pytest.raises(InputError, match="dots"):
         path_of(f"s3://bucket/{key}")
 

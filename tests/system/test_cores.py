@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Callable, Mapping
-from pathlib import Path
 
 import pytest
 
@@ -14,7 +13,7 @@ CoresIn = Callable[[str, Mapping[str, str]], int]
 
 
 @pytest.fixture
-def cores_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> CoresIn:
+def cores_in(tmp_path, monkeypatch) -> CoresIn:
     """Says what a process finds that may run on eight cores."""
     monkeypatch.setattr(cores, "_allowed_cores", lambda: 8)
     monkeypatch.setattr(cores, "MEMBERSHIP", tmp_path / "cgroup")
@@ -62,15 +61,13 @@ def version_1(group: str, quota: int, period: int = 100_000) -> dict[str, str]:
         ("0::/\n", {"cpu.max": "9" * 5000 + " 1\n"}, 8),
     ],
 )
-def test_a_share_of_time_limits_the_cores(
-    cores_in: CoresIn, membership: str, files: Mapping[str, str], expected: int
-) -> None:
+def test_a_share_of_time_limits_the_cores(cores_in, membership, files, expected) -> None:
     assert cores_in(membership, files) == expected
 
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="the system has no affinity")
 def test_where_there_are_no_control_groups_it_is_the_cores_it_may_run_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path, monkeypatch
 ) -> None:
     monkeypatch.setattr(cores, "MEMBERSHIP", tmp_path / "none")
     before = os.sched_getaffinity(0)
@@ -92,7 +89,7 @@ def test_threads_are_a_whole_number_and_none_are_one_for_each_core() -> None:
 
 @pytest.mark.parametrize(("user", "inside"), [(None, "passive"), ("active", "active")])
 def test_what_is_imported_inside_is_told_to_sleep_unless_the_user_has_said_otherwise(
-    monkeypatch: pytest.MonkeyPatch, user: str | None, inside: str
+    monkeypatch, user, inside
 ) -> None:
     monkeypatch.delenv(WAIT_POLICY, raising=False)
     if user is not None:

@@ -28,7 +28,7 @@ PROJECT = tomllib.loads(
 
 
 @pytest.fixture
-def nothing_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+def nothing_installed(monkeypatch) -> None:
     for extra in EXTRAS:
         monkeypatch.setitem(sys.modules, extra.library, None)
 
@@ -63,7 +63,7 @@ def requirements(lines: list[str]) -> set[str]:
     ],
 )
 def test_what_is_missing_is_named_with_the_smallest_extras_that_bring_it(
-    libraries: list[Extra], reason: str, extras: str
+    libraries, reason, extras
 ) -> None:
     with pytest.raises(MissingExtraError) as refusal:
         require("demo", *libraries)
@@ -87,9 +87,7 @@ def test_what_is_installed_is_not_refused_and_not_imported() -> None:
     assert there.load("anything").__name__ == "json.tool"
 
 
-def test_a_library_that_is_there_and_broken_is_not_called_missing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_library_that_is_there_and_broken_is_not_called_missing(tmp_path, monkeypatch) -> None:
     (tmp_path / "derain_broken.py").write_text("import derain_lacks_this")
     monkeypatch.syspath_prepend(str(tmp_path))
     with pytest.raises(InputError, match=r"cannot be imported.*derain_lacks_this") as refusal:
@@ -97,9 +95,7 @@ def test_a_library_that_is_there_and_broken_is_not_called_missing(
     assert not isinstance(refusal.value, MissingExtraError)
 
 
-def test_an_import_that_failed_is_told_if_an_extra_would_mend_it(
-    request: pytest.FixtureRequest,
-) -> None:
+def test_an_import_that_failed_is_told_if_an_extra_would_mend_it(request) -> None:
     of_a_part = ModuleNotFoundError("no", name="matplotlib.nothing")
     assert missing_extra("view", of_a_part) is None  # the library itself is installed
     request.getfixturevalue("nothing_installed")

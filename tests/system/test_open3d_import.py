@@ -21,7 +21,7 @@ from derain.system.open3d_import import (
 
 
 @pytest.fixture
-def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+def installed(tmp_path, monkeypatch) -> SimpleNamespace:
     """An Open3D and a libusb of our own, on a machine whose system has no libusb."""
     library = tmp_path / "libusb_package/libusb-1.0.so"
     folder = tmp_path / "open3d"
@@ -45,7 +45,7 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SimpleNamespac
 
 
 @pytest.mark.parametrize("gone", [False, True])
-def test_the_library_lies_where_open3d_looks(installed: SimpleNamespace, gone: bool) -> None:
+def test_the_library_lies_where_open3d_looks(installed, gone) -> None:
     if gone:  # a link to a package that was there once
         installed.link.symlink_to("gone/libusb-1.0.so")
     assert link_libusb() == installed.link
@@ -55,9 +55,7 @@ def test_the_library_lies_where_open3d_looks(installed: SimpleNamespace, gone: b
     assert installed.loaded == []
 
 
-def test_a_link_that_cannot_be_made_is_reported(
-    installed: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_link_that_cannot_be_made_is_reported(installed, monkeypatch) -> None:
     def refuse(*paths: object) -> None:
         raise PermissionError(errno.EACCES, "Permission denied")
 
@@ -66,15 +64,13 @@ def test_a_link_that_cannot_be_made_is_reported(
         link_libusb()
 
 
-def test_a_library_of_the_system_is_left_to_serve(
-    installed: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_library_of_the_system_is_left_to_serve(installed, monkeypatch) -> None:
     monkeypatch.setattr(derain.system.open3d_import.ctypes, "CDLL", lambda name: None)
     assert link_libusb() is None
 
 
 def test_a_command_loads_the_library_and_writes_nothing_beside_open3d(
-    installed: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
+    installed, monkeypatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "open3d", ModuleType("open3d"))
     import_open3d()
@@ -83,7 +79,7 @@ def test_a_command_loads_the_library_and_writes_nothing_beside_open3d(
 
 
 def test_a_training_warns_of_what_tensorboard_lacks_and_writes_nothing_beside_open3d(
-    installed: SimpleNamespace, run_derain, capsys: pytest.CaptureFixture[str]
+    installed, run_derain, capsys
 ) -> None:
     outcome = run_derain("fit", "--config", "outdet_wads.yaml", "--trainer.max_epoch", "1")
     assert f"{LIBUSB}; `{SET_UP}`" in outcome.err
@@ -105,7 +101,7 @@ def test_tensorboard_loads_its_plug_ins_once_the_link_is_made() -> None:
 
 
 def test_without_open3d_a_training_on_worlds_says_what_to_install_and_leaves_nothing(
-    run_derain, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run_derain, tmp_path, monkeypatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, "open3d", None)

@@ -4,7 +4,6 @@ import importlib
 import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
 
@@ -15,7 +14,7 @@ Write = Callable[..., None]
 
 
 @pytest.fixture
-def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Write]:
+def write(tmp_path, monkeypatch) -> Iterator[Write]:
     """Writes modules of packages that can be imported for the length of a test."""
     before = set(sys.modules)
     monkeypatch.syspath_prepend(tmp_path)
@@ -33,7 +32,7 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Write]:
 
 
 @pytest.fixture
-def things(write: Write) -> Registry[type]:
+def things(write) -> Registry[type]:
     """The registry of a package of two files, whose names are not in the order of their members."""
     write("things/first.py", member("pebble"))
     write("things/second.py", member("brick"))
@@ -74,9 +73,7 @@ def loaded() -> set[str]:
     return {name for name in sys.modules if name.startswith(("things.", "foreign"))}
 
 
-def test_modules_are_imported_when_somebody_asks_and_other_packages_last(
-    things: Registry[type], write: Write
-) -> None:
+def test_modules_are_imported_when_somebody_asks_and_other_packages_last(things, write) -> None:
     install(write, "cobble", member("cobble"))
     assert loaded() == {"things.registry"}
     assert "brick" in things  # its module is the second, and its name the first
@@ -95,11 +92,7 @@ def test_modules_are_imported_when_somebody_asks_and_other_packages_last(
     ],
 )
 def test_a_package_that_cannot_be_imported_is_warned_of_once_and_keeps_no_other_from_use(
-    things: Registry[type],
-    write: Write,
-    capsys: pytest.CaptureFixture[str],
-    content: str,
-    reason: str,
+    things, write, capsys, content, reason
 ) -> None:
     install(write, "bad", content)
     install(write, "good", member("cobble"))
@@ -116,7 +109,7 @@ def test_a_package_that_cannot_be_imported_is_warned_of_once_and_keeps_no_other_
 
 
 def test_a_file_of_the_package_that_cannot_be_imported_is_an_error_every_time(
-    things: Registry[type], write: Write
+    things, write
 ) -> None:
     write("things/third.py", "import nothing_of_this_name")
     for _ in range(2):
@@ -124,7 +117,7 @@ def test_a_file_of_the_package_that_cannot_be_imported_is_an_error_every_time(
             list(things)
 
 
-def test_two_of_one_name_are_refused_and_both_are_named(things: Registry[type]) -> None:
+def test_two_of_one_name_are_refused_and_both_are_named(things) -> None:
     class Other:
         pass
 
@@ -137,9 +130,7 @@ def test_two_of_one_name_are_refused_and_both_are_named(things: Registry[type]) 
     assert "cobble" not in things
 
 
-def test_a_class_without_a_method_of_its_base_is_refused_and_the_method_is_named(
-    things: Registry[type],
-) -> None:
+def test_a_class_without_a_method_of_its_base_is_refused_and_the_method_is_named(things) -> None:
     class Base(ABC):
         @abstractmethod
         def carry(self) -> None: ...
@@ -155,7 +146,7 @@ def test_a_class_without_a_method_of_its_base_is_refused_and_the_method_is_named
     assert "sand" not in things
 
 
-def test_one_member_may_have_several_names_and_answers_to_the_first(things: Registry[type]) -> None:
+def test_one_member_may_have_several_names_and_answers_to_the_first(things) -> None:
     class Slab:
         pass
 
@@ -166,7 +157,7 @@ def test_one_member_may_have_several_names_and_answers_to_the_first(things: Regi
     assert len(things) == 4
 
 
-def test_a_module_that_is_imported_anew_brings_its_member_anew(things: Registry[type]) -> None:
+def test_a_module_that_is_imported_anew_brings_its_member_anew(things) -> None:
     former = things["brick"]
     importlib.reload(sys.modules["things.second"])
     assert things["brick"] is not former
@@ -178,9 +169,7 @@ def test_a_module_that_is_imported_anew_brings_its_member_anew(things: Registry[
         number.add("five")(6)
 
 
-def test_a_module_may_ask_what_there_is_while_it_is_imported(
-    things: Registry[type], write: Write
-) -> None:
+def test_a_module_may_ask_what_there_is_while_it_is_imported(things, write) -> None:
     write("things/third.py", member("tile") + "\nKNOWN = list(ITEMS)")
     install(write, "cobble", member("cobble") + "\nKNOWN = list(ITEMS)")
     assert list(things) == ["brick", "cobble", "pebble", "tile"]
@@ -188,7 +177,7 @@ def test_a_module_may_ask_what_there_is_while_it_is_imported(
     assert list(things) == sys.modules["foreign_cobble"].KNOWN
 
 
-def test_entry_points_may_be_of_another_name_than_the_package(write: Write) -> None:
+def test_entry_points_may_be_of_another_name_than_the_package(write) -> None:
     items = registry(write, "'things', 'things of all'")
     install(write, "cobble", member("cobble"))
     assert list(items) == []

@@ -3,13 +3,11 @@
 import time
 from contextlib import suppress
 
-import pytest
-
 from derain.system.stopwatch import Stopwatch
 
 
 def test_a_stage_within_a_stage_is_not_counted_twice_and_one_that_raises_is_counted(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch,
 ) -> None:
     seconds, stopwatch = [0.0], Stopwatch()
     monkeypatch.setattr(time, "perf_counter", lambda: seconds[0])

@@ -7,7 +7,6 @@ import threading
 import time
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
-from pathlib import Path
 
 import pytest
 
@@ -55,7 +54,7 @@ subprocess.run([sys.executable, __file__], env={**os.environ, **told})
     [HAS_A_WORKER, HAS_A_RANK, HAS_A_PROCESS_OF_TORCHRUN],
     ids=["worker", "rank", "torchrun"],
 )
-def test_no_process_outlives_the_one_that_it_works_for(tmp_path: Path, program: str) -> None:
+def test_no_process_outlives_the_one_that_it_works_for(tmp_path, program) -> None:
     (tmp_path / "program.py").write_text(program)
     environment = {k: v for k, v in os.environ.items() if k != "LOCAL_RANK"}
     environment[LAUNCHER] = "1"  # as in a run that another run has begun
@@ -84,7 +83,7 @@ def test_an_error_does_not_wait_for_what_workers_are_at() -> None:
 
 @pytest.mark.parametrize("environment", [{}, {"LOCAL_RANK": "1"}], ids=["alone", "by hand"])
 def test_a_process_that_nobody_of_ours_began_goes_on_without_its_parent(
-    monkeypatch: pytest.MonkeyPatch, environment: dict[str, str]
+    monkeypatch, environment
 ) -> None:
     monkeypatch.setattr(os, "environ", dict(environment))
     threads = threading.active_count()

@@ -1,7 +1,6 @@
 """The ways back against plain loops, at every border and in every tie."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from numpy.typing import NDArray
 
 from derain.views.back_projection import (
     CHUNK,
-    PixelsToPoints,
     ProjectedPoints,
     copy,
     nearest_range,
@@ -90,17 +88,13 @@ def copy_by_hand(points: ProjectedPoints, score: NDArray[np.float32]) -> list[fl
     [(nearest_range, nearest_range_by_hand), (vote, vote_by_hand), (copy, copy_by_hand)],
 )
 @given(projection=projections())
-def test_a_way_back_equals_plain_loops(
-    back_projection: PixelsToPoints,
-    by_hand: Callable[..., list[float]],
-    projection: tuple[ProjectedPoints, NDArray[np.float32]],
-) -> None:
+def test_a_way_back_equals_plain_loops(back_projection, by_hand, projection) -> None:
     np.testing.assert_allclose(back_projection(*projection), by_hand(*projection), rtol=1e-6)
 
 
 @pytest.mark.parametrize("back_projection", [nearest_range, vote])
 def test_answers_do_not_depend_on_how_many_points_look_around_at_a_time(
-    back_projection: PixelsToPoints, monkeypatch: pytest.MonkeyPatch
+    back_projection, monkeypatch
 ) -> None:
     rng = np.random.default_rng(1)
     points = project(rng.integers(0, 600, 900), rng.uniform(1, 9, 900), (20, 30), True)

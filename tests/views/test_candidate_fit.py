@@ -29,9 +29,7 @@ def street(points: int, seed: int, drops: float = 0.2) -> tuple[Scan, NDArray[np
     st.lists(st.tuples(st.integers(1, 2000), st.integers(0, 99)), min_size=1, max_size=3),
     st.sampled_from([0.5, 0.9, 0.99, 0.999]),
 )
-def test_candidates_hold_at_least_the_rain_that_was_asked_for(
-    sizes: list[tuple[int, int]], inside: float
-) -> None:
+def test_candidates_hold_at_least_the_rain_that_was_asked_for(sizes, inside) -> None:
     scans = [street(points, seed) for points, seed in sizes]
     candidates = fit_candidates(scans, CHANNELS, inside)
     if candidates is None:
@@ -55,7 +53,7 @@ def test_a_margin_keeps_rain_of_other_scans_inside() -> None:
 
 
 @pytest.mark.parametrize("points", [250, 1000, 4000])
-def test_little_rain_makes_the_bounds_wider_than_its_outermost_drops(points: int) -> None:
+def test_little_rain_makes_the_bounds_wider_than_its_outermost_drops(points) -> None:
     other, rain = street(50_000, 0)
     outside = []
     for seed in range(1, 21):
@@ -99,7 +97,7 @@ def test_a_scan_without_intensity_bounds_none() -> None:
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
-def test_where_rain_is_as_the_rest_is_or_is_not_there_are_no_bounds(share: float) -> None:
+def test_where_rain_is_as_the_rest_is_or_is_not_there_are_no_bounds(share) -> None:
     scan, _ = street(5000, 6)
     anywhere = np.random.default_rng(7).random(5000) < share
     assert fit_candidates([(scan, anywhere)], CHANNELS) is None
@@ -107,6 +105,6 @@ def test_where_rain_is_as_the_rest_is_or_is_not_there_are_no_bounds(share: float
 
 
 @pytest.mark.parametrize("inside", [0.0, 0.4, 1.0, 1.5, float("nan")])
-def test_a_share_that_is_none_is_refused(inside: float) -> None:
+def test_a_share_that_is_none_is_refused(inside) -> None:
     with pytest.raises(InputError, match="is no share of the rain"):
         fit_candidates([street(100, 8)], CHANNELS, inside)

@@ -1,7 +1,6 @@
 """Candidates are the points within all bounds, and are read back as they were written."""
 
 import json
-from typing import Any
 
 import numpy as np
 import pytest
@@ -40,9 +39,7 @@ def a_scan(seed: int, intensity: bool) -> Scan:
 
 
 @given(rules, st.integers(0, 1000), st.booleans())
-def test_candidates_are_what_no_bound_leaves_out(
-    candidates: Candidates, seed: int, intensity: bool
-) -> None:
+def test_candidates_are_what_no_bound_leaves_out(candidates, seed, intensity) -> None:
     scan = a_scan(seed, intensity)
     expected = []
     for row in range(len(scan)):
@@ -59,7 +56,7 @@ def test_candidates_are_what_no_bound_leaves_out(
 
 
 @given(rules)
-def test_candidates_survive_json_and_say_each_of_their_numbers(candidates: Candidates) -> None:
+def test_candidates_survive_json_and_say_each_of_their_numbers(candidates) -> None:
     content = [{"channel": b.channel, "least": b.least, "most": b.most} for b in candidates.bounds]
     document = {"bounds": content, "points": 0.25, "rain": 0.5, "rain_share": 0.75}
     assert candidates_at(Entry("model", "", json.loads(json.dumps(document)))) == candidates
@@ -70,9 +67,7 @@ def test_candidates_survive_json_and_say_each_of_their_numbers(candidates: Candi
 
 
 @given(rules, rules, st.integers(0, 1000))
-def test_the_narrower_bounds_hold_what_both_hold(
-    some: Candidates, others: Candidates, seed: int
-) -> None:
+def test_the_narrower_bounds_hold_what_both_hold(some, others, seed) -> None:
     scan = a_scan(seed, intensity=True)
     both = Candidates(narrower(some.bounds, others.bounds))
     np.testing.assert_array_equal(both.among(scan), some.among(scan) & others.among(scan))
@@ -96,7 +91,7 @@ NEAR = {"channel": "range", "most": 30.0}
         ({"bounds": [NEAR], "sky": 0}, r"c\.sky: there is no such key"),
     ],
 )
-def test_what_does_not_describe_candidates_is_refused(content: Any, message: str) -> None:
+def test_what_does_not_describe_candidates_is_refused(content, message) -> None:
     with pytest.raises(InputError, match=message):
         candidates_at(Entry("model", "c", content))
 
@@ -108,7 +103,7 @@ def test_candidates_are_bounded_by_range_and_height_and_what_the_network_sees() 
 
 @pytest.mark.parametrize(("channel", "refused"), [("range", False), ("z", False), ("x", True)])
 def test_a_spec_refuses_candidates_bounded_by_what_its_network_does_not_see(
-    channel: str, refused: bool
+    channel, refused
 ) -> None:
     spec = Spec(
         network="outdet",

@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
-from numpy.typing import NDArray
 
 from derain.evaluation.hard_cases import hard_cases
 from derain.scan import Scan
@@ -32,9 +31,7 @@ def test_extra_are_all_but_the_usual_in_their_order() -> None:
 
 
 @given(hnp.arrays(np.float64, st.integers(1, 20)), st.floats(-100, 100, width=32))
-def test_each_value_is_the_scans_or_else_the_stand_in(
-    column: NDArray[np.float64], mean: float
-) -> None:
+def test_each_value_is_the_scans_or_else_the_stand_in(column, mean) -> None:
     scan = Scan(np.ones((len(column), 3), np.float32), fields={"doppler": column})
     rows = np.arange(len(column))[::-1]
     filled = filled_values(scan, rows, ["doppler"], {"doppler": mean})[:, 0]
@@ -49,7 +46,7 @@ def test_a_channel_without_a_stand_in_is_zero_where_it_is_missing() -> None:
 
 
 @pytest.mark.parametrize("scan", HARD_CASES.values(), ids=HARD_CASES)
-def test_valid_points_of_a_hard_scan_have_finite_values(scan: Scan) -> None:
+def test_valid_points_of_a_hard_scan_have_finite_values(scan) -> None:
     rows = np.flatnonzero(scan.valid)
     filled = filled_values(scan, rows, EVERYTHING, {"intensity": 9.0})
     assert filled.shape == (len(rows), len(EVERYTHING))

@@ -62,9 +62,7 @@ def points_at_borders(draw: st.DrawFn) -> tuple[SphericalGrid, NDArray[np.float3
 
 @settings(max_examples=300)
 @given(points_at_borders())
-def test_points_on_borders_have_the_pixel_that_trigonometry_gives_them(
-    points: tuple[SphericalGrid, NDArray[np.float32]],
-) -> None:
+def test_points_on_borders_have_the_pixel_that_trigonometry_gives_them(points) -> None:
     grid, xyz = points
     np.testing.assert_array_equal(grid.pixel(xyz), computed(grid, xyz))
 
@@ -77,7 +75,7 @@ def test_points_on_borders_have_the_pixel_that_trigonometry_gives_them(
         elements=st.floats(allow_nan=False, allow_infinity=False, width=32),
     ),
 )
-def test_so_have_any_finite_points(grid: SphericalGrid, xyz: NDArray[np.float32]) -> None:
+def test_so_have_any_finite_points(grid, xyz) -> None:
     np.testing.assert_array_equal(grid.pixel(xyz), computed(grid, xyz))
 
 
@@ -101,9 +99,7 @@ def scattered(count: int) -> NDArray[np.float32]:
 
 
 @pytest.mark.parametrize("grid", GRIDS, ids=str)
-def test_so_have_scattered_points_and_those_of_many_chunks(
-    grid: SphericalGrid, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_so_have_scattered_points_and_those_of_many_chunks(grid, monkeypatch) -> None:
     xyz = scattered(20_000)
     expected = computed(grid, xyz)
     np.testing.assert_array_equal(grid.pixel(xyz), expected)
@@ -112,12 +108,12 @@ def test_so_have_scattered_points_and_those_of_many_chunks(
 
 
 @pytest.mark.parametrize("grid", PUBLISHED, ids=list(PUBLISHED_GRIDS))
-def test_nearly_all_points_are_looked_up(grid: SphericalGrid) -> None:
+def test_nearly_all_points_are_looked_up(grid) -> None:
     assert (grid.table(scattered(20_000)) < UNSURE_BELOW).mean() < 0.06
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 1e-3, 1e-6]))
-def test_rounding_moves_no_point_by_a_quarter_of_the_margin(seed: int, flat: float) -> None:
+def test_rounding_moves_no_point_by_a_quarter_of_the_margin(seed, flat) -> None:
     rng = np.random.default_rng(seed)
     xyz = rng.normal(size=(2000, 3)) * 10 ** rng.uniform(-9, 9, (2000, 1))
     xyz[:, rng.integers(3)] *= flat or 1.0

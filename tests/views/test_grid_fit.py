@@ -1,7 +1,6 @@
 """The fitted grid on sensors made here, whose beams are known, and on every real scan."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -83,7 +82,7 @@ def test_second_returns_behind_the_first_are_counted_as_hidden() -> None:
 
 
 @pytest.mark.parametrize("ahead", [0, 90, 180, -120])
-def test_a_sensor_that_looks_one_way_gets_a_grid_that_does(ahead: float) -> None:
+def test_a_sensor_that_looks_one_way_gets_a_grid_that_does(ahead) -> None:
     fit = fit_grid([sensed(ahead + np.linspace(-50, 50, 501), BEAMS)])
     right, left = fit.grid.azimuth
     assert not fit.grid.is_full_circle
@@ -147,9 +146,7 @@ def organised(inclination: NDArray[np.float64], blur: float) -> Scan:
 
 
 @pytest.mark.parametrize("descending", [True, False])
-def test_rows_of_an_organised_scan_are_beams_where_inclination_tells_them(
-    descending: bool,
-) -> None:
+def test_rows_of_an_organised_scan_are_beams_where_inclination_tells_them(descending) -> None:
     # Beams that touch: by inclination alone there is one cluster.
     beams = np.cumsum(np.linspace(1, 0.2, 30)) - 12
     scan = organised(beams[::-1] if descending else beams, blur=0.1)
@@ -183,13 +180,13 @@ def test_shares_are_those_counted_by_hand() -> None:
 
 
 @pytest.mark.parametrize("scans", [[], [HARD_CASES["empty"]], [HARD_CASES["nothing valid"]]])
-def test_scans_without_a_valid_point_are_refused(scans: list[Scan]) -> None:
+def test_scans_without_a_valid_point_are_refused(scans) -> None:
     with pytest.raises(InputError, match="no valid point"):
         fit_grid(scans)
 
 
 @pytest.mark.parametrize("case", [name for name, scan in HARD_CASES.items() if scan.valid.any()])
-def test_hard_cases_get_a_grid_of_bounded_size_that_holds_them(case: str) -> None:
+def test_hard_cases_get_a_grid_of_bounded_size_that_holds_them(case) -> None:
     scan = HARD_CASES[case]
     fit = fit_grid([scan])
     assert fit.outside < 0.01
@@ -231,14 +228,7 @@ RADAR = ("x", "y", "z", *(f"column {number}" for number in range(3, 10)))
     ],
 )
 def test_real_sensors_get_the_grid_of_their_beams_and_shots(
-    shared: Path,
-    name: str,
-    rows: int,
-    columns: int,
-    beams: int,
-    azimuth: tuple[float, float] | None,
-    hidden: float,
-    empty: float,
+    shared, name, rows, columns, beams, azimuth, hidden, empty
 ) -> None:
     scan = read_scan(shared / "data" / name, RADAR if name.endswith(".npy") else DEFAULT_COLUMNS)
     fit = fit_grid([scan])
@@ -249,7 +239,7 @@ def test_real_sensors_get_the_grid_of_their_beams_and_shots(
     assert fit.empty <= empty
 
 
-def test_the_beams_of_wads_are_those_of_its_raw_scans(shared: Path) -> None:
+def test_the_beams_of_wads_are_those_of_its_raw_scans(shared) -> None:
     files = sorted((shared / "data/wads/sequences/36/velodyne").glob("*.bin"))
     fit = fit_grid([read_scan(file) for file in files])
     assert len(files) == 10

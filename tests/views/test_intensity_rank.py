@@ -18,9 +18,7 @@ def of_intensities(intensity: NDArray[np.float32] | None, points: int) -> Scan:
     hnp.arrays(np.uint8, st.integers(100, 300)).filter(lambda column: len(np.unique(column)) > 1),
     st.sampled_from([1 / 255, 1.0, 257.0]),
 )
-def test_ranks_keep_the_order_of_intensities_in_whatever_unit(
-    column: NDArray[np.uint8], gain: float
-) -> None:
+def test_ranks_keep_the_order_of_intensities_in_whatever_unit(column, gain) -> None:
     intensity = column.astype(np.float32)
     rank = intensity_rank(of_intensities(intensity, len(column)))
     scaled = intensity_rank(of_intensities(intensity * np.float32(gain), len(column)))

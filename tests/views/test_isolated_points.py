@@ -59,7 +59,7 @@ def test_drops_are_isolated_and_a_wall_is_not() -> None:
 
 @settings(max_examples=10)
 @given(st.integers(0, 2**32 - 1))
-def test_what_is_seen_does_not_depend_on_the_order_of_rows(seed: int) -> None:
+def test_what_is_seen_does_not_depend_on_the_order_of_rows(seed) -> None:
     scan = wall_and_drops()
     order = np.random.default_rng(seed).permutation(len(scan))
     seen, shuffled = VIEW(scan), VIEW(scan.take(order))
@@ -69,9 +69,7 @@ def test_what_is_seen_does_not_depend_on_the_order_of_rows(seed: int) -> None:
 
 
 @pytest.mark.parametrize("apart", [1e-6, 0.001, 0.02])
-def test_a_scan_whose_returns_are_written_twice_is_seen_as_if_they_were_written_once(
-    apart: float,
-) -> None:
+def test_a_scan_whose_returns_are_written_twice_is_seen_as_if_they_were_written_once(apart) -> None:
     scan = wall_and_drops()
     wide = scan.xyz.astype(np.float64)
     behind = wide * (1 + apart / np.linalg.norm(wide, axis=1, keepdims=True))
@@ -134,7 +132,7 @@ def test_points_are_counted_by_range_and_rank() -> None:
 
 
 @pytest.mark.parametrize(("name", "scan"), list(hard_cases(2000)))
-def test_hard_scans_are_viewed(name: str, scan: Scan) -> None:
+def test_hard_scans_are_viewed(name, scan) -> None:
     seen = VIEW(scan)
     assert (seen.judged == scan.valid).all()
     assert all(np.isfinite(array).all() for array in seen.inputs().values())
@@ -169,7 +167,7 @@ def test_crowding_is_what_is_near_along_the_curve_and_near_the_least_crowded_the
 
 
 @pytest.mark.parametrize("degrees", [0.1, 0.4, 2.0])
-def test_the_step_is_that_of_the_beams(degrees: float) -> None:
+def test_the_step_is_that_of_the_beams(degrees) -> None:
     azimuth, inclination = np.meshgrid(*2 * [np.radians(np.arange(-20, 20) * degrees)])
     level = np.cos(inclination)
     ball = 15 * np.stack(

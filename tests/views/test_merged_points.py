@@ -26,9 +26,7 @@ def merged(xyz: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int6
 
 
 @given(st.floats(1, 100), st.floats(1e-6, 0.9 * RANGE_RESOLUTION), st.integers(0, 2**32 - 1))
-def test_copies_along_the_ray_are_one_with_what_they_copy(
-    range_: float, behind: float, seed: int
-) -> None:
+def test_copies_along_the_ray_are_one_with_what_they_copy(range_, behind, seed) -> None:
     points = range_ * rays()
     copies = (range_ + behind) * rays()
     order = np.random.default_rng(seed).permutation(2 * len(points))
@@ -41,7 +39,7 @@ def test_copies_along_the_ray_are_one_with_what_they_copy(
 
 
 @pytest.mark.parametrize("apart", [1.2 * RANGE_RESOLUTION, 0.5])
-def test_a_second_return_farther_behind_stays(apart: float) -> None:
+def test_a_second_return_farther_behind_stays(apart) -> None:
     kept, point = merged(np.concatenate([10 * rays(), (10 + apart) * rays()]))
     assert len(kept) == len(point) == 2 * len(rays())
 

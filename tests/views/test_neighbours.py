@@ -1,7 +1,5 @@
 """The neighbour view against brute force, in every order and with every trouble."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -39,9 +37,7 @@ def brute_force(xyz: NDArray[np.float32], k: int) -> tuple[NDArray[np.int64], ND
 
 @pytest.mark.parametrize("clouds", [gridded, scattered], ids=["gridded", "scattered"])
 @given(data=st.data(), k=st.integers(1, 12))
-def test_neighbours_equal_brute_force(
-    clouds: st.SearchStrategy[NDArray[np.float32]], data: st.DataObject, k: int
-) -> None:
+def test_neighbours_equal_brute_force(clouds, data, k) -> None:
     xyz = np.unique(data.draw(clouds), axis=0)
     if not len(xyz):
         assert NeighbourSearch(xyz)(k)[0].shape == (0, k)
@@ -53,7 +49,7 @@ def test_neighbours_equal_brute_force(
 
 
 @given(gridded, st.randoms(use_true_random=False))
-def test_the_answer_does_not_depend_on_the_order_inside(xyz: NDArray[np.float32], random) -> None:
+def test_the_answer_does_not_depend_on_the_order_inside(xyz, random) -> None:
     xyz = np.unique(xyz, axis=0)
     if not len(xyz):
         return
@@ -64,7 +60,7 @@ def test_the_answer_does_not_depend_on_the_order_inside(xyz: NDArray[np.float32]
 
 
 @given(st.one_of(gridded, scattered))
-def test_distinct_positions_are_those_of_numpy_unique(xyz: NDArray[np.float32]) -> None:
+def test_distinct_positions_are_those_of_numpy_unique(xyz) -> None:
     first, inverse = distinct_positions(xyz)
     expected, expected_first = np.unique(xyz, axis=0, return_index=True)
     assert sorted(first) == sorted(expected_first)
@@ -73,9 +69,7 @@ def test_distinct_positions_are_those_of_numpy_unique(xyz: NDArray[np.float32]) 
 
 
 @given(gridded, st.randoms(use_true_random=False))
-def test_distinct_rows_are_those_of_the_rows_that_can_be_judged(
-    xyz: NDArray[np.float32], random
-) -> None:
+def test_distinct_rows_are_those_of_the_rows_that_can_be_judged(xyz, random) -> None:
     lost = np.array([random.random() < 0.3 for _ in xyz], bool)
     scan = Scan(np.where(lost[:, None], np.float32(np.nan), xyz))
     seen: dict[bytes, int] = {}
@@ -126,7 +120,7 @@ def test_rows_at_one_position_get_one_answer_and_invalid_rows_get_zero() -> None
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 8])
-def test_fewer_points_than_neighbours_repeat_the_farthest(count: int) -> None:
+def test_fewer_points_than_neighbours_repeat_the_farthest(count) -> None:
     xyz = np.c_[np.arange(1, count + 1), np.zeros((count, 2))].astype(np.float32)
     view = NeighbourView(neighbours=9)(Scan.of(np.c_[xyz, np.ones(count)]))
     assert view.neighbours.shape == view.distances.shape == (count, 9)
@@ -177,7 +171,7 @@ NEAR_AND_LOW = Candidates((Bound("range", most=15.0), Bound("intensity", most=30
 
 @given(st.integers(0, 200), st.integers(0, 50), st.integers(1, 9), st.floats(0, 60))
 def test_candidates_have_the_neighbourhoods_that_they_have_among_all(
-    points: int, seed: int, k: int, farthest: float
+    points, seed, k, farthest
 ) -> None:
     scan = Scan.of(np.repeat(scene(points + 10, seed)[:points], 2, axis=0))
     candidates = Candidates((Bound("range", most=farthest),))
@@ -225,7 +219,7 @@ def test_packing_keeps_the_candidates_of_every_scan_to_themselves() -> None:
     assert (len(packed["points"]), len(packed["candidates"])) == (point, candidate)
 
 
-def test_a_real_scan_agrees_with_scikit_learn(shared: Path) -> None:
+def test_a_real_scan_agrees_with_scikit_learn(shared) -> None:
     from sklearn.neighbors import KDTree
 
     points = np.fromfile(shared / "data/wads/sample.bin", np.float32).reshape(-1, 4)

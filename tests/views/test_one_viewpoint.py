@@ -1,8 +1,6 @@
 """Scans that are not what one sensor sees in metres are told of, and no others."""
 
-from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -98,7 +96,7 @@ def drive(scans: int, step: float) -> Points:
     "directions",
     [rays(64, 1024), rays(16, 1800), rays(256, 500, 120, 25), rays(32, 2048, opening=90)],
 )
-def test_what_one_sensor_sees_is_not_odd(directions: Points) -> None:
+def test_what_one_sensor_sees_is_not_odd(directions) -> None:
     assert kinds(street(directions)) == []
 
 
@@ -109,7 +107,7 @@ def test_nor_are_the_rays_of_a_rosette_which_crowd_where_it_looks() -> None:
     assert kinds(street(np.stack([np.cos(off), aside, up], axis=1))) == []
 
 
-def test_nor_are_two_returns_of_every_ray_in_dense_snow(spinning: Points) -> None:
+def test_nor_are_two_returns_of_every_ray_in_dense_snow(spinning) -> None:
     share = np.random.default_rng(0).uniform(0.05, 0.9, (len(spinning), 1))
     both = np.concatenate([spinning, spinning * share, spinning])  # and one of them twice
     assert kinds(both) == []
@@ -127,9 +125,7 @@ def test_nor_are_two_returns_of_every_ray_in_dense_snow(spinning: Points) -> Non
         (3.28084, ["ground farther than below any vehicle's sensor"]),
     ],
 )
-def test_units_show_in_how_far_points_and_the_ground_are(
-    spinning: Points, factor: float, found: list[str]
-) -> None:
+def test_units_show_in_how_far_points_and_the_ground_are(spinning, factor, found) -> None:
     assert kinds(spinning * factor) == found
 
 
@@ -137,7 +133,7 @@ def test_units_show_in_how_far_points_and_the_ground_are(
     ("directions", "height"), [(rays(64, 1024), 0.4), (rays(64, 1024), 4.0), (SKYWARD, 7.0)]
 )
 def test_a_sensor_on_a_robot_or_a_lorry_and_one_that_sees_no_ground_are_not_odd(
-    directions: Points, height: float
+    directions, height
 ) -> None:
     assert kinds(street(directions) * height / HEIGHT) == []
 
@@ -145,13 +141,11 @@ def test_a_sensor_on_a_robot_or_a_lorry_and_one_that_sees_no_ground_are_not_odd(
 @pytest.mark.parametrize(
     "origin", [(400_000, 500_000, 200), (400_000, 5_400_000, 200), (700, 100, 0), (0, 0, 300)]
 )
-def test_points_far_from_the_origin_are_those_of_a_map(
-    spinning: Points, origin: tuple[float, ...]
-) -> None:
+def test_points_far_from_the_origin_are_those_of_a_map(spinning, origin) -> None:
     assert kinds(moved(spinning, *origin)) == ["coordinates of a map"]
 
 
-def test_a_few_points_beyond_all_sensors_are_damage_and_no_map(spinning: Points) -> None:
+def test_a_few_points_beyond_all_sensors_are_damage_and_no_map(spinning) -> None:
     damaged = spinning.copy()
     damaged[:1000] = 2 * LARGEST_COORDINATE
     assert kinds(damaged) == []
@@ -171,7 +165,7 @@ FLAT = rays(1, 1000) * (1, 1, 0)
     ],
     ids=["plane", "cone", "half a cone", "tilted plane"],
 )
-def test_a_single_beam_is_one_plane_or_cone(directions: Points) -> None:
+def test_a_single_beam_is_one_plane_or_cone(directions) -> None:
     assert kinds(street(directions)) == ["a single beam"]
 
 
@@ -180,7 +174,7 @@ def test_four_beams_are_no_single_one() -> None:
 
 
 @pytest.mark.parametrize(("scans", "step"), [(10, 1.3), (5, 10.0)])
-def test_scans_merged_into_a_map_are_seen_from_several_places(scans: int, step: float) -> None:
+def test_scans_merged_into_a_map_are_seen_from_several_places(scans, step) -> None:
     merged = drive(scans, step)
     assert kinds(merged) == ["points of several viewpoints"]
     cells = np.floor(merged / 0.2).astype(int) @ (1, 10_000, 10_000**2)
@@ -205,7 +199,7 @@ def test_scans_of_a_moving_sensor_put_together_without_poses_are_odd() -> None:
     assert kinds(together) == ["points of several viewpoints"]
 
 
-def test_a_sensor_that_stands_sees_from_one_place_however_often(spinning: Points) -> None:
+def test_a_sensor_that_stands_sees_from_one_place_however_often(spinning) -> None:
     noise = np.random.default_rng(0).normal(1, 0.001, (10, *spinning.shape))
     assert kinds((spinning * noise).reshape(-1, 3)) == []
 
@@ -249,7 +243,7 @@ def test_the_range_step_is_that_of_the_farthest_returns_of_neighbouring_rays() -
 
 
 @pytest.mark.parametrize("points", [1, FEWEST_RETURNS - 1])
-def test_few_points_are_almost_none(spinning: Points, points: int) -> None:
+def test_few_points_are_almost_none(spinning, points) -> None:
     assert kinds(spinning[:points]) == ["almost empty"]
     nothing = np.full((5000, 3), np.nan)
     assert kinds(np.concatenate([spinning[:points], nothing])) == ["almost empty"]
@@ -259,11 +253,11 @@ def test_few_points_are_almost_none(spinning: Points, points: int) -> None:
 @pytest.mark.parametrize(
     "points", [np.zeros((0, 3)), np.zeros((500, 3)), np.full((500, 3), np.nan)]
 )
-def test_a_scan_without_a_point_is_not_odd(points: Points) -> None:
+def test_a_scan_without_a_point_is_not_odd(points) -> None:
     assert kinds(points) == []
 
 
-def test_every_oddity_says_what_can_be_done(spinning: Points) -> None:
+def test_every_oddity_says_what_can_be_done(spinning) -> None:
     remedies = {
         "divide millimetres": spinning * 1000,
         "neither in kilometres": spinning / 1000,
@@ -279,7 +273,7 @@ def test_every_oddity_says_what_can_be_done(spinning: Points) -> None:
 
 
 @pytest.mark.parametrize("method", ["network", "filter"])
-def test_networks_and_filters_say_it(spinning: Points, method: str) -> None:
+def test_networks_and_filters_say_it(spinning, method) -> None:
     scan = Scan.of(np.column_stack([spinning * 1000, np.resize(np.arange(90.0), len(spinning))]))
     if method == "network":
         found = OutDet().spec_for(load_card("wads")).issues(scan)
@@ -290,7 +284,7 @@ def test_networks_and_filters_say_it(spinning: Points, method: str) -> None:
 
 
 @pytest.fixture(scope="module")
-def real(shared: Path) -> dict[str, Scan]:
+def real(shared) -> dict[str, Scan]:
     """Every real scan that there is."""
     data = shared / "data"
     folders = ("clean", "snowykitti/velodyne", "wads", "wads/drive/velodyne")
@@ -298,7 +292,7 @@ def real(shared: Path) -> dict[str, Scan]:
     return {path.name: read_scan(path) for path in found if path.suffix in (".bin", ".npz", ".pcd")}
 
 
-def test_no_real_scan_is_odd(real: dict[str, Scan]) -> None:
+def test_no_real_scan_is_odd(real) -> None:
     assert len(real) >= 30
     assert not {name: odd for name, scan in real.items() if (odd := [*viewpoint_issues(scan)])}
 
@@ -314,16 +308,14 @@ def test_no_real_scan_is_odd(real: dict[str, Scan]) -> None:
         (lambda xyz: xyz[:20], "almost empty"),
     ],
 )
-def test_every_real_scan_is_once_it_is_changed(
-    real: dict[str, Scan], change: Callable[[NDArray[np.float32]], NDArray[np.float32]], kind: str
-) -> None:
+def test_every_real_scan_is_once_it_is_changed(real, change, kind) -> None:
     for name, scan in real.items():
         changed = Scan(change(scan.xyz[scan.valid]))
         (issue,) = viewpoint_issues(changed)
         assert kind in issue.kind, name
 
 
-def test_real_scans_in_feet_are_odd_unless_their_sensor_is_low(real: dict[str, Scan]) -> None:
+def test_real_scans_in_feet_are_odd_unless_their_sensor_is_low(real) -> None:
     changed = {name: Scan(scan.xyz[scan.valid] * np.float32(3.28)) for name, scan in real.items()}
     missed = {name for name, scan in changed.items() if not [*viewpoint_issues(scan)]}
     assert missed == {"hesai_at128_front.pcd", "velodyne_vlp16_dual.pcd"}
@@ -331,9 +323,7 @@ def test_real_scans_in_feet_are_odd_unless_their_sensor_is_low(real: dict[str, S
 
 @pytest.mark.parametrize("scans", [4, 10])
 @pytest.mark.parametrize("step", [1.33, 0.0], ids=["by poses", "without poses"])
-def test_real_scans_of_a_drive_are_odd_once_merged(
-    real: dict[str, Scan], scans: int, step: float
-) -> None:
+def test_real_scans_of_a_drive_are_odd_once_merged(real, scans, step) -> None:
     drive = [scan for name, scan in sorted(real.items()) if name.startswith("0422")]
     assert len(drive) == 20
     parts = [scan.xyz[scan.valid] + np.float32([step * n, 0, 0]) for n, scan in enumerate(drive)]

@@ -22,7 +22,7 @@ LARGEST = float(np.finfo(np.float32).max)
 
 
 @given(logits(50.0))
-def test_it_is_the_softmax(logits: NDArray[np.float32]) -> None:
+def test_it_is_the_softmax(logits) -> None:
     probability = probability_of_rain(logits)
     assert probability.dtype == np.float32
     expected = softmax(logits.astype(np.float64), axis=1)[:, 1]
@@ -30,7 +30,7 @@ def test_it_is_the_softmax(logits: NDArray[np.float32]) -> None:
 
 
 @given(logits(LARGEST))
-def test_no_logit_overflows(logits: NDArray[np.float32]) -> None:
+def test_no_logit_overflows(logits) -> None:
     with np.errstate(all="raise", under="ignore"):
         probability = probability_of_rain(logits)
     assert ((probability >= 0) & (probability <= 1)).all()

@@ -45,9 +45,7 @@ def shown_by_hand(scan: Scan, pixel: NDArray[np.int64], size: int) -> list[int]:
 
 @pytest.mark.parametrize("grid", [FULL, FRONT], ids=["full circle", "front"])
 @given(points=clouds)
-def test_every_pixel_shows_the_nearest_of_its_points(
-    grid: SphericalGrid, points: NDArray[np.float32]
-) -> None:
+def test_every_pixel_shows_the_nearest_of_its_points(grid, points) -> None:
     scan = Scan.of(points)
     image = RangeView(grid)(scan)
     expected = np.full(len(scan), -1)
@@ -65,9 +63,7 @@ def test_every_pixel_shows_the_nearest_of_its_points(
 
 
 @given(points=clouds, random=st.randoms(use_true_random=False))
-def test_the_order_of_the_rows_changes_nothing_but_ties(
-    points: NDArray[np.float32], random: st.randoms
-) -> None:
+def test_the_order_of_the_rows_changes_nothing_but_ties(points, random) -> None:
     # Ranges of their own for all points: there are no ties.
     points[:, :3] *= np.linspace(1, 1.1, len(points), dtype=np.float32)[:, None]
     order = np.array(random.sample(range(len(points)), len(points)), np.int64)
@@ -125,11 +121,7 @@ BOUNDS = st.builds(
 @pytest.mark.parametrize("grid", [FULL, FRONT], ids=["full circle", "front"])
 @given(points=clouds, candidates=BOUNDS, seed=st.integers(0, 2**32 - 1))
 def test_candidates_are_given_scores_of_candidates_alone(
-    grid: SphericalGrid,
-    back_projection: str,
-    points: NDArray[np.float32],
-    candidates: Candidates,
-    seed: int,
+    grid, back_projection, points, candidates, seed
 ) -> None:
     rng, scan = np.random.default_rng(seed), Scan.of(points)
     score = rng.random(grid.rows * grid.columns, np.float32)
@@ -185,7 +177,7 @@ def test_an_unknown_back_projection_is_refused() -> None:
 
 
 @pytest.mark.parametrize("case", HARD_CASES)
-def test_hard_cases_have_finite_images_and_every_judged_row_an_answer(case: str) -> None:
+def test_hard_cases_have_finite_images_and_every_judged_row_an_answer(case) -> None:
     scan = HARD_CASES[case]
     for grid in (grid_of("semantickitti", "test"), FRONT):
         image = RangeView(grid)(scan)
@@ -212,7 +204,7 @@ REAL_SCANS = [
 
 
 @pytest.mark.parametrize("name", REAL_SCANS)
-def test_scores_come_back_to_every_point_of_every_real_scan(shared: Path, name: str) -> None:
+def test_scores_come_back_to_every_point_of_every_real_scan(shared, name) -> None:
     scan = read_scan(shared / "data" / name, RADAR if name.endswith(".npy") else DEFAULT_COLUMNS)
     view = RangeView(fit_grid([scan]).grid)
     image = view(scan)
@@ -247,7 +239,7 @@ def iou_of_perfect_pixels(view: RangeView, scan: Scan, rain: NDArray[np.bool_]) 
 
 @pytest.mark.parametrize("fitted_to", ["sample.bin", "sequences/36/velodyne/042223.bin"])
 def test_a_perfect_labelling_of_a_fitted_grid_is_nearly_perfect_for_the_points(
-    shared: Path, fitted_to: str
+    shared, fitted_to
 ) -> None:
     wads = shared / "data/wads"
     view = RangeView(fit_grid([read_scan(wads / fitted_to)]).grid)
@@ -265,7 +257,7 @@ def test_a_perfect_labelling_of_a_fitted_grid_is_nearly_perfect_for_the_points(
     ],
 )
 def test_what_published_grids_allow_is_as_measured_elsewhere(
-    shared: Path, grid: SphericalGrid, back_projection: str, iou: float
+    shared, grid, back_projection, iou
 ) -> None:
     sample = labelled(shared / "data/wads/sample.bin")
     found = iou_of_perfect_pixels(RangeView(grid, back_projection=back_projection), *sample)

@@ -1,7 +1,5 @@
 """What a file's columns say of returns counts, and agrees with what directions say."""
 
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -63,11 +61,10 @@ def of_echoes(recording: Recording) -> dict[str, NDArray[Any]]:
 
 
 STATED = [of_las, of_las_bits, of_old_las_bits, of_nebula, of_autoware, of_livox, of_echoes]
-Columns = Callable[[Recording], dict[str, NDArray[Any]]]
 
 
 @pytest.mark.parametrize("columns", STATED)
-def test_what_the_file_says_is_what_directions_say(columns: Columns) -> None:
+def test_what_the_file_says_is_what_directions_say(columns) -> None:
     recording = Recording(1)
     scan = with_columns(recording, **columns(recording))
     by_directions = pair_returns(Scan.of(recording.xyz))
@@ -78,7 +75,7 @@ def test_what_the_file_says_is_what_directions_say(columns: Columns) -> None:
 
 
 @pytest.mark.parametrize("columns", STATED)
-def test_a_return_whose_partner_is_not_in_the_file_is_known_by_its_column(columns: Columns) -> None:
+def test_a_return_whose_partner_is_not_in_the_file_is_known_by_its_column(columns) -> None:
     recording = Recording(2)
     _, nearer, farther = recording.truth()
     whole = with_columns(recording, **columns(recording))
@@ -130,7 +127,7 @@ def test_a_column_that_counts_inwards_is_taken_the_other_way_round() -> None:
         {"range": np.zeros(10), "range2": np.ones(10)},
     ],
 )
-def test_a_column_that_tells_nothing_counts_for_nothing(column: dict[str, NDArray[Any]]) -> None:
+def test_a_column_that_tells_nothing_counts_for_nothing(column) -> None:
     scan = Scan(np.random.default_rng(0).normal(5, 1, (10, 3)).astype(np.float32), fields=column)
     assert stated_returns(scan) is None
     returns = pair_returns(scan)
@@ -158,7 +155,7 @@ def test_ranges_that_no_sensor_measures_are_no_second_return() -> None:
     assert np.isnan(returns.partner_range[:3]).all()
 
 
-def test_ousters_second_returns_lie_behind_the_first_or_in_front(shared: Path) -> None:
+def test_ousters_second_returns_lie_behind_the_first_or_in_front(shared) -> None:
     scan = read_scan(shared / "data" / "clean" / "ouster_os0_32_dual.npz")
     first, second = (scan.fields[name].astype(np.int64) for name in ("range", "range2"))
     returns = pair_returns(scan)
@@ -170,7 +167,7 @@ def test_ousters_second_returns_lie_behind_the_first_or_in_front(shared: Path) -
     np.testing.assert_allclose(returns.partner_range[both], second[both] / 1000, rtol=0.02)
 
 
-def test_the_types_of_the_velodyne_file_are_told_by_its_geometry(shared: Path) -> None:
+def test_the_types_of_the_velodyne_file_are_told_by_its_geometry(shared) -> None:
     scan = read_scan(shared / "data" / "clean" / "velodyne_vlp16_dual.pcd")
     returns = pair_returns(scan)
     # Of its driver, "last" is the nearer of two: all that lie in one direction say so.

@@ -1,7 +1,5 @@
 """Returns are paired with those of their own ray, and with no other's."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -28,9 +26,7 @@ def assert_same(found: RayReturns, expected: RayReturns) -> None:
 
 @settings(max_examples=15)
 @given(st.integers(0, 2**32), st.floats(0.01, 0.9), st.sampled_from([0.25, 0.3, 1.0]))
-def test_the_rays_of_a_sensor_of_two_returns_are_found(
-    seed: int, share: float, step: float
-) -> None:
+def test_the_rays_of_a_sensor_of_two_returns_are_found(seed, share, step) -> None:
     recording = Recording(seed, share, step)
     partner, nearer, farther = recording.truth()
     returns = pair_returns(Scan.of(recording.xyz))
@@ -56,9 +52,7 @@ def apart(unit: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("noise", [0.0, 0.001, 0.01])
-def test_pairs_are_those_of_a_brute_force_search_anywhere_on_the_sphere(
-    seed: int, noise: float
-) -> None:
+def test_pairs_are_those_of_a_brute_force_search_anywhere_on_the_sphere(seed, noise) -> None:
     generator = np.random.default_rng(seed)
     unit = generator.normal(size=(900, 3))
     unit[::3] *= [0.03, 0.03, 1]  # about the poles
@@ -76,7 +70,7 @@ def test_pairs_are_those_of_a_brute_force_search_anywhere_on_the_sphere(
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_the_order_of_the_rows_does_not_matter(seed: int) -> None:
+def test_the_order_of_the_rows_does_not_matter(seed) -> None:
     recording = Recording(seed)
     order = np.random.default_rng(seed).permutation(len(recording.xyz))
     back = np.argsort(order)
@@ -133,7 +127,7 @@ def test_a_radars_detections_are_of_no_ray() -> None:
 
 
 @pytest.mark.parametrize("step", [0.011, 0.03, 0.049, 0.2])
-def test_directions_that_agree_by_chance_are_of_no_pair(step: float) -> None:
+def test_directions_that_agree_by_chance_are_of_no_pair(step) -> None:
     generator = np.random.default_rng(3)
     width = 120 * step
     azimuth, inclination = np.radians(generator.uniform(0, width, (2, 15_000)))
@@ -144,7 +138,7 @@ def test_directions_that_agree_by_chance_are_of_no_pair(step: float) -> None:
 
 
 @pytest.mark.parametrize("name", HARD_CASES)
-def test_hard_cases_have_an_answer(name: str) -> None:
+def test_hard_cases_have_an_answer(name) -> None:
     scan = HARD_CASES[name]
     returns = pair_returns(scan)
     has = returns.partner >= 0
@@ -162,6 +156,6 @@ def test_a_scan_is_paired_once() -> None:
 
 
 @pytest.mark.parametrize("name", CLEAN)
-def test_real_scans_of_single_returns_have_no_pair(shared: Path, name: str) -> None:
+def test_real_scans_of_single_returns_have_no_pair(shared, name) -> None:
     returns = pair_returns(read_scan(shared / "data" / "clean" / name))
     assert_same(returns, RayReturns.single(len(returns.nearer)))

@@ -1,7 +1,6 @@
 """What is odd about a scan: missing, constant and mistaken intensities, and what lies outside."""
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -41,13 +40,13 @@ def kinds(scan: Scan, checker: ScanChecker) -> list[str]:
     return [issue.kind for issue in checker.issues(scan)]
 
 
-def test_an_ordinary_scan_is_not_odd(spec: Spec) -> None:
+def test_an_ordinary_scan_is_not_odd(spec) -> None:
     for checker in (spec, SSR(), DROR(), IntensityRule(1.0, 20.0)):
         assert kinds(Scan.of(scene(300)), checker) == []
 
 
 @pytest.mark.parametrize("value", [0.0, 7.0, 255.0, 65_535.0])
-def test_one_intensity_everywhere_was_not_measured(spec: Spec, value: float) -> None:
+def test_one_intensity_everywhere_was_not_measured(spec, value) -> None:
     scan = with_intensity(value)
     (issue,) = spec.issues(scan)
     assert issue.kind == "intensity not measured"
@@ -60,13 +59,13 @@ def test_one_intensity_everywhere_was_not_measured(spec: Spec, value: float) -> 
     assert kinds(scan, DROR()) == []  # it looks at places alone
 
 
-def test_intensities_that_are_no_numbers_were_not_measured(spec: Spec) -> None:
+def test_intensities_that_are_no_numbers_were_not_measured(spec) -> None:
     for values in (np.nan, np.resize([np.nan, np.inf, 1e9], 300)):
         (issue,) = spec.issues(with_intensity(values))
         assert issue.detail.startswith("no intensity is a possible value")
 
 
-def test_every_channel_that_is_missing_is_an_oddity_of_its_own(spec: Spec) -> None:
+def test_every_channel_that_is_missing_is_an_oddity_of_its_own(spec) -> None:
     seeing = replace(
         spec,
         channels=("intensity", "doppler"),
@@ -79,7 +78,7 @@ def test_every_channel_that_is_missing_is_an_oddity_of_its_own(spec: Spec) -> No
 
 @pytest.mark.parametrize(("full_scale", "unit"), [(1.0, "smaller"), (65_535.0, "larger")])
 def test_intensities_of_another_unit_are_told_from_those_of_a_bright_scene(
-    spec: Spec, full_scale: float, unit: str
+    spec, full_scale, unit
 ) -> None:
     # Bright enough for the means to be no farther apart than those of two scenes may be.
     shares = np.random.default_rng(0).beta(*((8, 4) if full_scale == 1 else (0.05, 20)), 3000)
@@ -89,9 +88,7 @@ def test_intensities_of_another_unit_are_told_from_those_of_a_bright_scene(
         assert kinds(scan.with_intensity_times(255 / full_scale), checker) == []
 
 
-def test_real_scans_are_odd_only_where_their_intensities_are_shares(
-    spec: Spec, shared: Path
-) -> None:
+def test_real_scans_are_odd_only_where_their_intensities_are_shares(spec, shared) -> None:
     units = {
         "clean/kitti_hdl64.bin": ["intensity of a smaller unit"],
         "clean/kitti_front.bin": ["intensity of a smaller unit"],
@@ -107,13 +104,13 @@ def test_real_scans_are_odd_only_where_their_intensities_are_shares(
         assert {name: kinds(scan, checker) for name, scan in scans.items()} == units
 
 
-def test_a_unit_that_is_not_stated_is_told_by_the_mean_alone(spec: Spec) -> None:
+def test_a_unit_that_is_not_stated_is_told_by_the_mean_alone(spec) -> None:
     unknown = replace(spec, units=("m", "m", "m", "not stated"))
     assert kinds(with_intensity(scene(300)[:, 3] / 255), unknown) == ["intensity of a smaller unit"]
     assert kinds(with_intensity(scene(300)[:, 3] * 2), unknown) == []
 
 
-def test_a_scan_without_a_point_is_not_odd(spec: Spec) -> None:
+def test_a_scan_without_a_point_is_not_odd(spec) -> None:
     for points in (np.zeros((0, 4), np.float32), np.full((200, 4), np.nan, np.float32)):
         for checker in (spec, SSR(), DROR(), IntensityRule(1.0, 20.0)):
             assert kinds(Scan.of(points), checker) == []
@@ -121,7 +118,7 @@ def test_a_scan_without_a_point_is_not_odd(spec: Spec) -> None:
         assert list(outside_view(Scan.of(points), np.zeros(len(points), bool), spec.data)) == []
 
 
-def test_points_outside_the_view_are_odd_where_they_are_many(spec: Spec) -> None:
+def test_points_outside_the_view_are_odd_where_they_are_many(spec) -> None:
     scan = Scan.of(scene(1000))
     few = np.arange(1000) >= 1000 * MOST_OUTSIDE
     assert list(outside_view(scan, few, spec.data)) == []
@@ -156,7 +153,7 @@ def test_ssr_and_the_rule_find_nothing_where_intensity_was_not_measured() -> Non
 
 
 @pytest.mark.parametrize(("judged", "result"), [(True, "judged without it"), (False, "stay")])
-def test_intensity_that_is_missing_in_places_is_counted(judged: bool, result: str) -> None:
+def test_intensity_that_is_missing_in_places_is_counted(judged, result) -> None:
     intensity = np.arange(300, dtype=np.float32)
     assert not list(intensity_in_places(with_intensity(intensity), np.ones(300, bool)))
     intensity[::3] = [np.nan, np.inf] * 50

@@ -25,7 +25,7 @@ def of_one(xyz: NDArray[np.float64]) -> float:
 
 @settings(max_examples=200)
 @given(clouds)
-def test_it_is_the_share_of_the_smallest_eigenvalue(xyz: NDArray[np.float64]) -> None:
+def test_it_is_the_share_of_the_smallest_eigenvalue(xyz) -> None:
     if np.ptp(xyz, axis=0).max() > 1e-3:  # below, the mean of far numbers rounds it away
         assert of_one(xyz) == pytest.approx(by_numpy(xyz), abs=1e-7)
 
@@ -41,9 +41,7 @@ def test_it_is_the_share_of_the_smallest_eigenvalue(xyz: NDArray[np.float64]) ->
         ([[2, 0, 0], [-2, 0, 0], [0, 2, 0], [0, -2, 0], [0, 0, 1], [0, 0, -1]], 1 / 9),
     ],
 )
-def test_what_is_known_of_places_lines_planes_and_stars(
-    xyz: list[list[int]], expected: float, size: float
-) -> None:
+def test_what_is_known_of_places_lines_planes_and_stars(xyz, expected, size) -> None:
     assert of_one(np.array(xyz, np.float64) * size) == pytest.approx(expected, abs=1e-8)
 
 

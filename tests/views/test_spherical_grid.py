@@ -57,7 +57,7 @@ def test_even_grids_are_the_published_projection() -> None:
 
 
 @given(grids())
-def test_the_middle_of_every_pixel_lies_in_it(grid: SphericalGrid) -> None:
+def test_the_middle_of_every_pixel_lies_in_it(grid) -> None:
     right, left = grid.azimuth
     edges = np.array(grid.edges)
     azimuth = left - (left - right) * (np.arange(grid.columns) + 0.5) / grid.columns
@@ -67,9 +67,7 @@ def test_the_middle_of_every_pixel_lies_in_it(grid: SphericalGrid) -> None:
 
 
 @given(grids(), st.floats(-180, 180), st.floats(-89, 89))
-def test_a_point_has_a_pixel_exactly_if_it_is_within_the_bounds(
-    grid: SphericalGrid, azimuth: float, inclination: float
-) -> None:
+def test_a_point_has_a_pixel_exactly_if_it_is_within_the_bounds(grid, azimuth, inclination) -> None:
     right, left = grid.azimuth
     turns = [azimuth + turn for turn in (-720, -360, 0, 360, 720)]
     # How far inside each pair of bounds, negative outside; what is on a bound is another test's.
@@ -83,7 +81,7 @@ def test_a_point_has_a_pixel_exactly_if_it_is_within_the_bounds(
 
 
 @pytest.mark.parametrize("y", [0.0, -0.0])
-def test_straight_behind_is_column_0_of_a_full_circle_whatever_the_sign_of_zero(y: float) -> None:
+def test_straight_behind_is_column_0_of_a_full_circle_whatever_the_sign_of_zero(y) -> None:
     assert pixel(FULL, -10, y, -1) == pixel(FULL, -10, 1e-6, -1)
     assert pixel(FULL, -10, y, -1) == (33, 0)
     assert pixel(FULL, -10, -1e-3, -1) == (33, 2047)
@@ -141,7 +139,7 @@ def test_beams_at_the_poles_stay_below_them() -> None:
 
 
 @given(grids())
-def test_a_grid_comes_back_from_json_bit_for_bit(grid: SphericalGrid) -> None:
+def test_a_grid_comes_back_from_json_bit_for_bit(grid) -> None:
     content = json.loads(json.dumps(grid.as_dict()))
     assert grid_of(content, "model.onnx") == grid
 
@@ -154,9 +152,7 @@ def test_a_grid_comes_back_from_json_bit_for_bit(grid: SphericalGrid) -> None:
         ("wads", (64, 2048), (-27.941, 16.767)),
     ],
 )
-def test_published_grids_are_known_by_name(
-    name: str, shape: tuple[int, int], inclination: tuple[float, float]
-) -> None:
+def test_published_grids_are_known_by_name(name, shape, inclination) -> None:
     assert name in PUBLISHED_GRIDS
     grid = grid_of(name, "config.yaml")
     assert (grid.rows, grid.columns) == shape
@@ -197,7 +193,7 @@ def test_a_user_describes_a_grid_in_yaml() -> None:
         ({"columns": 64, "edges": [2.0, 1.0], "azimuth": [-180, 181]}, "azimuth from -180 to 181"),
     ],
 )
-def test_what_is_not_a_grid_is_refused_with_its_reason(config: Any, reason: str) -> None:
+def test_what_is_not_a_grid_is_refused_with_its_reason(config, reason) -> None:
     with pytest.raises(InputError, match=r"config\.yaml") as error:
         grid_of(config, "config.yaml")
     assert reason in str(error.value)

@@ -33,7 +33,7 @@ def test_derain_has_these_views_and_each_knows_its_name() -> None:
 
 
 @pytest.mark.parametrize("view", OURS.values(), ids=OURS.keys())
-def test_a_view_reads_back_what_it_says_of_itself(view: View) -> None:
+def test_a_view_reads_back_what_it_says_of_itself(view) -> None:
     channels, fill_value = ("z", "range"), {"z": 1.5}
     entry = Entry("model", "view", view.as_dict())
     assert entry.value["kind"] == view.NAME
@@ -47,7 +47,7 @@ def test_a_view_reads_back_what_it_says_of_itself(view: View) -> None:
 
 
 @pytest.mark.parametrize("view", OURS.values(), ids=OURS.keys())
-def test_a_view_of_one_scan_sees_nothing_of_those_around_it(view: View) -> None:
+def test_a_view_of_one_scan_sees_nothing_of_those_around_it(view) -> None:
     assert view.window == Window(before=0, after=0)
     judged, other = (PlacedScan(Scan.of(scene(200, seed))) for seed in (1, 2))
     seen = view.of_window(WindowOfScans(judged, before=[other], after=[other]))
@@ -124,9 +124,7 @@ def spec_seen_through(view: Mapping[str, Any]) -> Spec:
     )
 
 
-def test_a_view_of_another_package_sees_a_window_and_stands_in_a_spec(
-    registered: type[View],
-) -> None:
+def test_a_view_of_another_package_sees_a_window_and_stands_in_a_spec(registered) -> None:
     spec = spec_seen_through(registered().as_dict())
     view = Spec.from_dict(spec.as_dict(), "model").make_view()
     assert isinstance(view, registered)

@@ -28,18 +28,14 @@ holds = st.integers(1, 6)
 
 
 @given(st.lists(st.tuples(st.floats(0, 80), st.floats(0, 80)), max_size=60), holds)
-def test_worse_visibility_never_has_a_lower_level(
-    pairs: list[tuple[float, float]], hold: int
-) -> None:
+def test_worse_visibility_never_has_a_lower_level(pairs, hold) -> None:
     worse = levels(Alarm(hold=hold), *(seen(min(pair)) for pair in pairs))
     better = levels(Alarm(hold=hold), *(seen(max(pair)) for pair in pairs))
     assert all(one >= other for one, other in zip(worse, better, strict=True))
 
 
 @given(ranges, st.lists(st.booleans(), min_size=40, max_size=40), holds)
-def test_scans_of_which_nothing_is_known_change_nothing(
-    metres: list[float], gaps: list[bool], hold: int
-) -> None:
+def test_scans_of_which_nothing_is_known_change_nothing(metres, gaps, hold) -> None:
     without = levels(Alarm(hold=hold), *map(seen, metres))
     alarm, told = Alarm(hold=hold), []
     for each, gap in zip(metres, gaps, strict=False):
@@ -51,9 +47,7 @@ def test_scans_of_which_nothing_is_known_change_nothing(
 
 
 @given(ranges, st.floats(0, 80), holds)
-def test_what_stays_long_enough_decides_whatever_was_before(
-    metres: list[float], last: float, hold: int
-) -> None:
+def test_what_stays_long_enough_decides_whatever_was_before(metres, last, hold) -> None:
     if 15 <= last < 20 or 30 <= last < 40:  # it may stay as it was
         return
     alarm = Alarm(hold=hold)
@@ -112,7 +106,7 @@ def test_the_level_of_one_scan_is_the_worst_that_is_certain() -> None:
     ],
 )
 def test_range_that_a_dry_scan_reaches_and_this_one_does_not_counts_like_rain(
-    dry: float | None, reach: float, level: Level
+    dry, reach, level
 ) -> None:
     reference = None if dry is None else seen(dry)
     for visibility in (over(1000), seen(100)):

@@ -1,7 +1,5 @@
 """Rays are counted once, where they first meet rain or else end, in any order of the rows."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -65,9 +63,7 @@ def counted_one_by_one(returns: list[Return]) -> NDArray[np.int64]:
 
 @settings(max_examples=200)
 @given(returns_of_rays, st.integers(0, 2**32 - 1))
-def test_a_ray_ends_at_its_first_drop_or_else_where_it_was_seen_last(
-    returns: list[Return], seed: int
-) -> None:
+def test_a_ray_ends_at_its_first_drop_or_else_where_it_was_seen_last(returns, seed) -> None:
     # Of bins, where float32 is next to the border of one, either may be right.
     returns = [each for each in returns if 0.01 < each[1] % BIN < BIN - 0.01]
     scan, rain = scan_of(returns)
@@ -104,7 +100,7 @@ def test_what_cannot_be_judged_and_what_a_radar_saw_is_of_no_ray() -> None:
     assert np.argwhere(ends).tolist() == [[0, 0, 10]]
 
 
-def test_of_real_scans_as_many_rays_are_found_as_by_their_pairs_of_returns(shared: Path) -> None:
+def test_of_real_scans_as_many_rays_are_found_as_by_their_pairs_of_returns(shared) -> None:
     # One of single returns, without its copies; one of two returns as the sensor wrote it.
     for scan_file, label_file in (
         ("clean/kitti_front.bin", None),
@@ -121,7 +117,7 @@ def test_of_real_scans_as_many_rays_are_found_as_by_their_pairs_of_returns(share
 
 
 @given(st.lists(st.integers(0, 2**32 - 1) | st.integers(0, 20), max_size=200))
-def test_each_number_is_left_once_and_the_others_repeat_it(values: list[int]) -> None:
+def test_each_number_is_left_once_and_the_others_repeat_it(values) -> None:
     numbers = np.array(values, np.uint32)
     repeating, repeated = repetitions(numbers)
     np.testing.assert_array_equal(numbers[repeating], numbers[repeated])

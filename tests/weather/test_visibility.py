@@ -38,7 +38,7 @@ def drawn(
     ("rate", "walls"), [(0.001, (1, 12)), (0.005, (3, 30)), (0.02, (30, 40)), (0.1, (1, 12))]
 )
 def test_drops_at_a_rate_have_the_visibility_of_that_rate_wherever_the_walls_are(
-    rate: float, walls: tuple[float, float]
+    rate, walls
 ) -> None:
     seen = visibility_of(*drawn(rate, 1_000_000, walls))
     assert seen.metres == pytest.approx(-math.log(SHARE_THROUGH) / rate, rel=0.03)
@@ -46,9 +46,7 @@ def test_drops_at_a_rate_have_the_visibility_of_that_rate_wherever_the_walls_are
 
 
 @given(counts, counts, st.integers(0, BINS - 1))
-def test_a_ray_more_that_meets_rain_makes_visibility_no_better(
-    other: NDArray[np.int64], rain: NDArray[np.int64], place: int
-) -> None:
+def test_a_ray_more_that_meets_rain_makes_visibility_no_better(other, rain, place) -> None:
     if other[place] == 0:
         return
     worse_other, worse_rain = other.copy(), rain.copy()
@@ -60,9 +58,7 @@ def test_a_ray_more_that_meets_rain_makes_visibility_no_better(
 
 
 @given(counts, counts, st.integers(2, 5))
-def test_ends_enclose_the_estimate_and_the_more_rays_the_more_closely(
-    other: NDArray[np.int64], rain: NDArray[np.int64], times: int
-) -> None:
+def test_ends_enclose_the_estimate_and_the_more_rays_the_more_closely(other, rain, times) -> None:
     once, often = visibility_of(other, rain), visibility_of(times * other, times * rain)
     assert often.at_least >= once.at_least
     assert often.at_most <= once.at_most

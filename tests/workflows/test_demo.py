@@ -1,7 +1,6 @@
 """The demonstration shows its steps, and leaves the files that it names."""
 
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +23,7 @@ from derain.workflows.progress import Steps
 
 
 @pytest.fixture
-def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> DemoConfig:
+def small(tmp_path, monkeypatch) -> DemoConfig:
     """Three streets of one scan each, one network for one epoch, and two methods beside it."""
     try:
         import_open3d()
@@ -46,7 +45,7 @@ def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> DemoConfig:
 
 
 @pytest.mark.usefixtures("one_block")
-def test_every_step_is_shown_and_leaves_its_files(small: DemoConfig) -> None:
+def test_every_step_is_shown_and_leaves_its_files(small) -> None:
     lines: list[str] = []
     bench = run_demo(small, lines.append)
     steps = [line.partition(":")[0] for line in lines if re.match(r"[A-Z]\w+: ", line)]
@@ -78,9 +77,7 @@ def test_every_step_is_shown_and_leaves_its_files(small: DemoConfig) -> None:
     assert list(out.glob("runs/outdet_simulated/version_0/events.out.tfevents.*"))
 
 
-def test_the_model_that_comes_with_derain_cleans_your_own_scans(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_model_that_comes_with_derain_cleans_your_own_scans(tmp_path, capsys) -> None:
     mine = write_scenes(tmp_path / "mine", 500, 500, name="{}.bin")
     (mine / "cut.bin").write_bytes(b"12345")
     out, lines = tmp_path / "out", []
@@ -92,9 +89,7 @@ def test_the_model_that_comes_with_derain_cleans_your_own_scans(
     assert {path.name for path in out.glob("*.label")} == {"0.label", "1.label"}
 
 
-def test_an_unreadable_scan_is_refused_before_the_first_step(
-    tmp_path: Path, run_derain: Callable
-) -> None:
+def test_an_unreadable_scan_is_refused_before_the_first_step(tmp_path, run_derain) -> None:
     (tmp_path / "cut.bin").write_bytes(b"12345")
     for name, reason in (("cut.bin", "5 bytes are not whole rows"), ("none", "there is no such")):
         outcome = run_derain("demo", "--out", tmp_path / "out", "--scan", tmp_path / name)

@@ -25,7 +25,7 @@ DROPS = np.arange(300) >= 270
 
 
 @pytest.fixture
-def data(tmp_path: Path) -> Taught:
+def data(tmp_path) -> Taught:
     """A drive of three scans that a filter has taught."""
     drive = write_scenes(tmp_path / "drive/velodyne", *3 * [300], name="{}.bin")
     teach(FilterDerainer(DROR()), named_frames([drive]), tmp_path / "taught")
@@ -41,7 +41,7 @@ def label(tmp_path: Path, rain: int) -> None:
     write_labels(tmp_path / "drive/labels/2.label", np.where(DROPS, rain, 0))
 
 
-def test_teacher_and_student_are_measured_by_the_labels(data: Taught, tmp_path: Path) -> None:
+def test_teacher_and_student_are_measured_by_the_labels(data, tmp_path) -> None:
     label(tmp_path, rain=110)
     frames = data.frames("validation")
     text = scores_by_labels(frames, data.card, "wads", student)
@@ -57,7 +57,7 @@ def test_teacher_and_student_are_measured_by_the_labels(data: Taught, tmp_path: 
     assert f"{10 / 270:.2%}" in rows[solid]
 
 
-def test_labels_beside_a_bag_measure_too(tmp_path: Path) -> None:
+def test_labels_beside_a_bag_measure_too(tmp_path) -> None:
     bag = small_bag(tmp_path, "mcap")
     write_labels(tmp_path / "drive.labels/000002.label", np.where(DROPS, 110, 0))
     teach(FilterDerainer(DROR()), named_frames([bag]), tmp_path / "taught")
@@ -67,13 +67,13 @@ def test_labels_beside_a_bag_measure_too(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("card", ["wads", "no_such_card"])
-def test_labels_that_cannot_be_used_are_named(data: Taught, tmp_path: Path, card: str) -> None:
+def test_labels_that_cannot_be_used_are_named(data, tmp_path, card) -> None:
     label(tmp_path, rain=65535)
     text = scores_by_labels(data.frames("validation"), data.card, card, student)
     assert text.startswith("Nothing could be measured: ")
 
 
-def test_persistence_sees_the_scans_around_those_held_out(tmp_path: Path) -> None:
+def test_persistence_sees_the_scans_around_those_held_out(tmp_path) -> None:
     drive = write_scenes(tmp_path / "drive/velodyne", *12 * [2000])
     teach(FilterDerainer(DROR()), named_frames([drive]), tmp_path / "taught")
     data = Taught(str(tmp_path / "taught"))

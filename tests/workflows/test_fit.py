@@ -23,9 +23,7 @@ def test_settings_are_options_of_the_command() -> None:
 
 
 @pytest.mark.usefixtures("one_block")
-def test_a_training_returns_its_best_checkpoint_and_score(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_training_returns_its_best_checkpoint_and_score(tmp_path, capsys) -> None:
     for sequence in ("00", "01"):
         folder = tmp_path / "WADS/sequences" / sequence
         (folder / "velodyne").mkdir(parents=True)

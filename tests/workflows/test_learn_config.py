@@ -35,7 +35,7 @@ def save_start(path: Path, channels: tuple[str, ...]) -> str:
 
 
 def test_a_network_is_trained_by_its_configuration_without_intensity_where_it_is_blind(
-    tmp_path: Path,
+    tmp_path,
 ) -> None:
     scans, dark = write_scans(tmp_path / "scans"), write_scans(tmp_path / "dark", columns=3)
     plain = Student("outdet", False, None, "outdet_taught.yaml", {}, 20)
@@ -55,9 +55,7 @@ def test_a_network_is_trained_by_its_configuration_without_intensity_where_it_is
 
 
 @pytest.mark.parametrize("columns", [3, 4])
-def test_it_begins_with_the_model_of_derain_unless_another_is_named(
-    tmp_path: Path, columns: int
-) -> None:
+def test_it_begins_with_the_model_of_derain_unless_another_is_named(tmp_path, columns) -> None:
     scans = write_scans(tmp_path / "scans", columns)
     unasked = student_of(config(tmp_path / "scans"), scans)
     settings = {"start": "default"}
@@ -67,7 +65,7 @@ def test_it_begins_with_the_model_of_derain_unless_another_is_named(
     assert student_of(config(tmp_path / "scans", blind=True), scans).blind
 
 
-def test_a_student_sees_what_its_start_sees(tmp_path: Path) -> None:
+def test_a_student_sees_what_its_start_sees(tmp_path) -> None:
     scans = write_scans(tmp_path / "scans")
     start = save_start(tmp_path / "mine.ckpt", ("range",))
     student = student_of(config(tmp_path / "scans", start=start), scans)
@@ -75,7 +73,7 @@ def test_a_student_sees_what_its_start_sees(tmp_path: Path) -> None:
     assert str(student) == f"outdet, blind to intensity, started from {start}"
 
 
-def test_cues_weigh_intensity_where_there_is_any_and_are_never_blind_to_it(tmp_path: Path) -> None:
+def test_cues_weigh_intensity_where_there_is_any_and_are_never_blind_to_it(tmp_path) -> None:
     scans, dark = write_scans(tmp_path / "scans"), write_scans(tmp_path / "dark", columns=3)
     for source in (scans, dark):
         student = student_of(config(tmp_path / "scans", model="cues"), source)
@@ -85,7 +83,7 @@ def test_cues_weigh_intensity_where_there_is_any_and_are_never_blind_to_it(tmp_p
 
 
 def test_a_network_without_a_configuration_has_that_of_a_network_of_the_same_view(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path, monkeypatch
 ) -> None:
     scans = write_scans(tmp_path / "scans")
     monkeypatch.setattr(registry, "NETWORKS", {"on_points": OutDet, "on_images": SalsaNext})
@@ -108,12 +106,7 @@ def test_a_network_without_a_configuration_has_that_of_a_network_of_the_same_vie
     ],
 )
 def test_what_does_not_go_with_a_start_is_refused(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    channels: tuple[str, ...],
-    columns: int,
-    options: dict[str, object],
-    reason: str,
+    tmp_path, monkeypatch, channels, columns, options, reason
 ) -> None:
     monkeypatch.chdir(tmp_path)
     scans = write_scans(tmp_path / "scans", columns)
@@ -122,7 +115,7 @@ def test_what_does_not_go_with_a_start_is_refused(
         student_of(config(tmp_path / "scans", start=start, **options), scans)
 
 
-def test_odometry_is_needed_where_there_are_no_poses(tmp_path: Path) -> None:
+def test_odometry_is_needed_where_there_are_no_poses(tmp_path) -> None:
     folder = tmp_path / "drive/velodyne"
     write_scans(folder)
 

@@ -70,7 +70,7 @@ def test_good_results_raise_no_doubt_but_that_of_units() -> None:
     ],
     ids=lambda case: case[:20] if isinstance(case, str) else "",
 )
-def test_what_gives_reason_to_doubt_is_reported(results: LearnResults, names: str) -> None:
+def test_what_gives_reason_to_doubt_is_reported(results, names) -> None:
     assert any(names in doubt for doubt in doubts(results))
     assert names in as_markdown(results)
 

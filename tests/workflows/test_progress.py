@@ -10,7 +10,7 @@ from derain.workflows.progress import EpochLines
 
 
 @pytest.fixture
-def seconds(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+def seconds(monkeypatch) -> list[float]:
     """What the clock reads, from its first reading on."""
     readings: list[float] = []
     monkeypatch.setattr(time, "monotonic", lambda: readings.pop(0))
@@ -33,14 +33,7 @@ def trainer(epoch: int, last: int | None, iou: float | None = None, first_proces
         (0, None, 1.0, "epoch 1: IoU 1.000; 1:12"),
     ],
 )
-def test_a_line_counts_epochs_and_time(
-    seconds: list[float],
-    epoch: int,
-    last: int | None,
-    iou: float | None,
-    line: str,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_line_counts_epochs_and_time(seconds, epoch, last, iou, line, capsys) -> None:
     seconds += [100.0, 172.0]
     lines = EpochLines()
     lines.on_train_start(trainer(0, last), None)
@@ -48,9 +41,7 @@ def test_a_line_counts_epochs_and_time(
     assert capsys.readouterr() == ("", f"{line}\n")
 
 
-def test_a_training_that_goes_on_reckons_by_its_own_epochs(
-    seconds: list[float], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_training_that_goes_on_reckons_by_its_own_epochs(seconds, capsys) -> None:
     seconds += [0.0, 60.0, 60.0]
     lines = EpochLines()
     lines.on_train_start(trainer(10, 14), None)

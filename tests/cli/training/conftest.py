@@ -1,20 +1,18 @@
 """What tests of Lightning's commands share."""
 
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
 import pytest
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def here(tmp_path, monkeypatch) -> None:
     """Runs, checkpoints and predictions go to a folder of the test's own."""
     monkeypatch.chdir(tmp_path)
 
 
 @pytest.fixture
-def last_line(run_derain: Callable[..., Any]) -> Callable[..., str]:
+def last_line(run_derain) -> Callable[..., str]:
     """Runs a command that is refused with exit code 2; gives the line after Lightning's own."""
 
     def run(*arguments: object) -> str:

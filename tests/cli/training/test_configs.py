@@ -22,8 +22,6 @@ from derain.workflows.training import DerainCLI
 
 WriteScan = Callable[..., None]
 
-# Fills a folder with a data set; returns the options it needs and its folder of test scans.
-Prepare = Callable[[Path, WriteScan], tuple[list[str], Path]]
 
 # A step of training and one of validation.
 ONE_STEP = [
@@ -63,7 +61,7 @@ def taught_scenes(root: Path, write_labelled: WriteScan) -> tuple[list[str], Pat
 
 @pytest.mark.parametrize("config", sorted(packaged_configs().keys() - TRAINED))
 def test_model_data_and_trainer_are_those_that_a_packaged_configuration_names(
-    succeed, monkeypatch: pytest.MonkeyPatch, write_labelled: WriteScan, config: str
+    succeed, monkeypatch, write_labelled, config
 ) -> None:
     made: list[DerainCLI] = []
 
@@ -94,11 +92,7 @@ def test_model_data_and_trainer_are_those_that_a_packaged_configuration_names(
     ],
 )
 def test_a_packaged_configuration_is_trained_measured_and_deployed(
-    succeed,
-    monkeypatch: pytest.MonkeyPatch,
-    write_labelled: WriteScan,
-    config: str,
-    prepare: Prepare,
+    succeed, monkeypatch, write_labelled, config, prepare
 ) -> None:
     options, test_folder = prepare(Path("data"), write_labelled)
     data = ["--config", config, "--data.root", "data", *options, *ONE_STEP]
@@ -132,7 +126,7 @@ def test_a_packaged_configuration_is_trained_measured_and_deployed(
 
 @pytest.mark.usefixtures("two_sizes")
 def test_lisnownet_is_trained_without_a_label_in_the_whole_data_set(
-    succeed, last_line, write_labelled: WriteScan
+    succeed, last_line, write_labelled
 ) -> None:
     for sequence in ("00", "01", "02"):
         folder = Path("data/sequences") / sequence

@@ -29,7 +29,7 @@ FIT = ("fit", "--config", "outdet_simulated.yaml")
         ("--trainer.max_epochs", "-3", "--trainer: `max_epochs` must be"),
     ],
 )
-def test_an_option_is_refused_in_a_line(last_line, option: str, value: str, said: str) -> None:
+def test_an_option_is_refused_in_a_line(last_line, option, value, said) -> None:
     assert said in last_line(*FIT, f"{option}={value}")
     assert not Path("runs").exists()
 
@@ -45,7 +45,7 @@ def test_an_option_is_refused_in_a_line(last_line, option: str, value: str, said
         ("trainer: " + 100 * "[", "mine.yaml: cannot be read as .yaml (nested more than"),
     ],
 )
-def test_a_configuration_is_refused_in_a_line(last_line, content: str, said: str) -> None:
+def test_a_configuration_is_refused_in_a_line(last_line, content, said) -> None:
     Path("mine.yaml").write_text(content)
     assert said in last_line(*FIT, "--config", "mine.yaml")
     assert not Path("runs").exists()

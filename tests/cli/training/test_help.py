@@ -11,7 +11,7 @@ from derain.workflows.configurations import packaged_configs
     ("command", "option"),
     [("fit", "--help"), ("validate", "-h"), ("test", "--help"), ("predict", "-h")],
 )
-def test_help_fits_on_a_screen_and_starts_with_examples(succeed, command: str, option: str) -> None:
+def test_help_fits_on_a_screen_and_starts_with_examples(succeed, command, option) -> None:
     outcome = succeed(command, option)
     assert len(outcome.out.splitlines()) < 40
     examples, options = outcome.out.split("\noptions:\n")
@@ -37,7 +37,7 @@ def test_the_options_of_a_class_are_listed_without_a_configuration(succeed) -> N
 
 
 @pytest.mark.parametrize("command", ["fit", "test"])
-def test_a_command_alone_names_the_configurations(refused, command: str) -> None:
+def test_a_command_alone_names_the_configurations(refused, command) -> None:
     line = refused(command)
     assert line.startswith(f"derain: {command}: no configuration is given. Give --config ")
     assert all(name in line for name in packaged_configs())

@@ -1,7 +1,6 @@
 """The packaged mixture trains and predicts, on two small made-up data sets."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +15,7 @@ QUICK = [
 ]
 
 
-def test_the_packaged_mixture_goes_from_training_to_predictions(
-    succeed, write_labelled: Callable[..., None]
-) -> None:
+def test_the_packaged_mixture_goes_from_training_to_predictions(succeed, write_labelled) -> None:
     snow, streets = Path("WADS/sequences"), Path("streets/sequences")
     for sequence in (name for names in load_card("wads").split.values() for name in names):
         folder = snow / sequence

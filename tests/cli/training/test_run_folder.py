@@ -20,7 +20,7 @@ def full_disk() -> Iterator[None]:
 
 
 def test_a_full_disk_is_one_line_and_leaves_the_earlier_checkpoint(
-    last_line, wads: list[str], checkpoint: Path, request: pytest.FixtureRequest
+    last_line, wads, checkpoint, request
 ) -> None:
     earlier = Path("saved/best.ckpt")
     earlier.parent.mkdir()
@@ -33,9 +33,7 @@ def test_a_full_disk_is_one_line_and_leaves_the_earlier_checkpoint(
 
 
 @pytest.mark.parametrize("folder", ["file/below", "/proc/derain"])
-def test_a_log_folder_that_cannot_be_written_is_one_line(
-    last_line, wads: list[str], folder: str
-) -> None:
+def test_a_log_folder_that_cannot_be_written_is_one_line(last_line, wads, folder) -> None:
     Path("file").touch()
     line = last_line("fit", *wads, *SHORT, "--trainer.logger.save_dir", folder)
     assert line.startswith(str(Path.cwd() / folder))

@@ -15,7 +15,7 @@ from derain.workflows.configurations import packaged_configs, with_packaged_conf
 
 
 @pytest.mark.parametrize("written", [["--config", "{}"], ["-c", "{}"], ["--config={}"]])
-def test_a_packaged_configuration_is_found_by_name(written: list[str]) -> None:
+def test_a_packaged_configuration_is_found_by_name(written) -> None:
     packaged = packaged_configs()["outdet_wads.yaml"]
     assert packaged.is_file()
     arguments = ["fit", *(part.format("outdet_wads.yaml") for part in written), "--data.root", "x"]
@@ -36,7 +36,7 @@ def test_an_unknown_configuration_is_one_line_with_the_known_ones(refused) -> No
 
 
 @pytest.fixture
-def bad_checkpoints(checkpoint: Path) -> None:
+def bad_checkpoints(checkpoint) -> None:
     content = torch.load(checkpoint, weights_only=True)
     parameters = content["hyper_parameters"]
     spec = {**parameters["spec"], "network": "resnet"}
@@ -56,18 +56,14 @@ def bad_checkpoints(checkpoint: Path) -> None:
         ("test", "resnet.ckpt", "a checkpoint of 'resnet'"),
     ],
 )
-def test_a_checkpoint_that_cannot_be_used_is_one_line(
-    refused, wads: list[str], command: str, path: str, reason: str
-) -> None:
+def test_a_checkpoint_that_cannot_be_used_is_one_line(refused, wads, command, path, reason) -> None:
     line = refused(command, *wads, "--ckpt_path", path)
     assert line.startswith(f"derain: {path}: ")
     assert reason in line
     assert not Path("runs").exists()
 
 
-def test_a_checkpoint_chooses_no_module_to_import(
-    succeed, wads: list[str], checkpoint: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_checkpoint_chooses_no_module_to_import(succeed, wads, checkpoint, monkeypatch) -> None:
     Path("foreign.py").write_text("raise RuntimeError('imported')")
     monkeypatch.syspath_prepend(str(Path.cwd()))
     content = torch.load(checkpoint, weights_only=True)
@@ -79,7 +75,7 @@ def test_a_checkpoint_chooses_no_module_to_import(
 
 
 def test_a_training_that_diverges_is_one_line_and_leaves_no_checkpoint_of_it(
-    last_line, wads: list[str]
+    last_line, wads
 ) -> None:
     too_fast = ["--trainer.max_epochs", "3", "--model.learning_rate", "1e30"]
     line = last_line("fit", *wads, *too_fast)
@@ -89,7 +85,7 @@ def test_a_training_that_diverges_is_one_line_and_leaves_no_checkpoint_of_it(
         load_model(path)
 
 
-def test_no_training_goes_on_from_weights_alone(refused, wads: list[str], checkpoint: Path) -> None:
+def test_no_training_goes_on_from_weights_alone(refused, wads, checkpoint) -> None:
     line = refused("fit", *wads, "--ckpt_path", checkpoint)
     reason = "holds weights alone, without the state of a training to resume"
     assert line.startswith(f"derain: {checkpoint}: {reason}. Resume from the last.ckpt of a run")
@@ -97,7 +93,7 @@ def test_no_training_goes_on_from_weights_alone(refused, wads: list[str], checkp
 
 
 def test_intensities_of_another_unit_are_warned_of_and_scaled(
-    succeed, wads: list[str], checkpoint: Path, tmp_path: Path
+    succeed, wads, checkpoint, tmp_path
 ) -> None:
     predict = ["predict", *wads, "--ckpt_path", checkpoint, "--predictions.folder"]
     assert "derain: warning: " not in succeed(*predict, "whole").err
@@ -112,9 +108,7 @@ def test_intensities_of_another_unit_are_warned_of_and_scaled(
     assert Path("scaled/0.label").read_bytes() == Path("whole/0.label").read_bytes()
 
 
-def test_training_goes_on_from_a_checkpoint_and_keeps_what_was_best_before(
-    succeed, wads: list[str]
-) -> None:
+def test_training_goes_on_from_a_checkpoint_and_keeps_what_was_best_before(succeed, wads) -> None:
     first, second = (Path(f"runs/outdet_wads/version_{n}/checkpoints") for n in (0, 1))
     # The earlier the better, as where a training goes wrong.
     earliest = ["--checkpoint.monitor", "epoch", "--checkpoint.mode", "min"]
@@ -134,9 +128,7 @@ def test_training_goes_on_from_a_checkpoint_and_keeps_what_was_best_before(
 SCALARS = {"test/iou", "test/f1", "test/precision", "test/recall", "test/average_precision"}
 
 
-def test_a_test_is_logged_into_the_folder_of_its_training(
-    succeed, wads: list[str], caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_test_is_logged_into_the_folder_of_its_training(succeed, wads, caplog) -> None:
     with caplog.at_level("INFO", "lightning.pytorch.utilities.rank_zero"):
         trained = succeed("fit", *wads, "--trainer.max_epochs", "2")
     run = Path("runs/outdet_wads/version_0")
@@ -168,7 +160,7 @@ def test_a_test_is_logged_into_the_folder_of_its_training(
 
 
 def test_a_test_is_logged_where_an_option_names_or_into_a_folder_of_its_own(
-    succeed, wads: list[str], checkpoint: Path
+    succeed, wads, checkpoint
 ) -> None:
     of_a_run = Path("runs/mine/version_7/checkpoints/best.ckpt")
     of_a_run.parent.mkdir(parents=True)

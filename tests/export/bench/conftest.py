@@ -1,7 +1,5 @@
 """Labelled scans that the tests of the bench share, and a bench in this process."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -17,7 +15,7 @@ CARD = DataCard("made up", {0: "solid", 3: "rain", 9: "unknown"}, rain=(3,), unk
 
 
 @pytest.fixture
-def labelled(tmp_path: Path) -> LabelledFrames:
+def labelled(tmp_path) -> LabelledFrames:
     """Three scans of 300 points, of which 30 are drops, and in the first 20 are not known."""
     for number in range(3):
         path = tmp_path / f"sequence {number}/scans/{number}.bin"
@@ -33,6 +31,6 @@ def labelled(tmp_path: Path) -> LabelledFrames:
 
 
 @pytest.fixture
-def here(monkeypatch: pytest.MonkeyPatch) -> None:
+def here(monkeypatch) -> None:
     """Times methods in this process; that each has its own is tested by itself."""
     monkeypatch.setattr(bench, "measure_cost", measure_in_process)

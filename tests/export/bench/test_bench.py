@@ -16,7 +16,6 @@ from derain.evaluation.counts import Counts
 from derain.evaluation.scores import score
 from derain.export.bench.bench import bench, scored_methods
 from derain.export.bench.bench_entries import FILE_SIZE, bench_entries
-from derain.export.bench.labelled_frames import LabelledFrames
 from derain.export.methods import load_method
 from derain.export.model_file import number_of_weights
 from derain.export.runtime import Derainer
@@ -34,7 +33,7 @@ def parameters(path: Path, **content: object) -> str:
     return str(path)
 
 
-def test_a_row_is_called_by_its_title_else_by_its_name(tmp_path: Path) -> None:
+def test_a_row_is_called_by_its_title_else_by_its_name(tmp_path) -> None:
     odd = parameters(tmp_path / "r=0.1.yaml", method="dsor", range_multiplier=0.1)
     names = {
         str(KEPT): ("outdet", "outdet"),
@@ -52,9 +51,7 @@ def test_a_row_is_called_by_its_title_else_by_its_name(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("here")
-def test_methods_are_names_files_derainers_filters_and_functions(
-    labelled: LabelledFrames, tmp_path: Path
-) -> None:
+def test_methods_are_names_files_derainers_filters_and_functions(labelled, tmp_path) -> None:
     derainer = Derainer(KEPT, 1)
     derainer.spec = replace(derainer.spec, threshold=0.4)
     methods = {
@@ -86,7 +83,7 @@ def test_methods_are_names_files_derainers_filters_and_functions(
 
 
 @pytest.mark.usefixtures("here")
-def test_scans_in_memory_score_as_the_same_scans_in_files(labelled: LabelledFrames) -> None:
+def test_scans_in_memory_score_as_the_same_scans_in_files(labelled) -> None:
     methods = ["dsor", "position", "intensity"]
     files = [frame.path for frame in labelled.frames]
     scans = [labelled.reader.read(frame) for frame in labelled.frames]
@@ -120,9 +117,7 @@ for row in found.rows:
 """
 
 
-def test_a_script_that_guards_nothing_is_run_once_and_times_its_own_functions(
-    tmp_path: Path,
-) -> None:
+def test_a_script_that_guards_nothing_is_run_once_and_times_its_own_functions(tmp_path) -> None:
     (tmp_path / "script.py").write_text(SCRIPT)
     finished = subprocess.run(
         [sys.executable, str(tmp_path / "script.py")], capture_output=True, text=True
@@ -134,9 +129,7 @@ def test_a_script_that_guards_nothing_is_run_once_and_times_its_own_functions(
 @pytest.mark.parametrize(
     "answer", [lambda n: np.ones(n + 1, bool), lambda n: np.ones(n), lambda n: None]
 )
-def test_a_function_that_gives_no_mask_fails_in_every_scan(
-    labelled: LabelledFrames, answer
-) -> None:
+def test_a_function_that_gives_no_mask_fails_in_every_scan(labelled, answer) -> None:
     (entry,) = bench_entries({"odd": lambda scan: answer(len(scan))})
     scans = map(labelled.reader.read, labelled.frames)
     (scores,) = score(scored_methods([entry], 1), scans, labelled.card)
@@ -155,12 +148,12 @@ def test_a_function_that_gives_no_mask_fails_in_every_scan(
         (["x=dror", "x=none"], "x: it is the title of two methods"),
     ],
 )
-def test_a_method_that_cannot_be_used_is_refused(methods: list[object], reason: str) -> None:
+def test_a_method_that_cannot_be_used_is_refused(methods, reason) -> None:
     with pytest.raises(InputError, match=reason):
         bench_entries(methods)  # type: ignore[arg-type]
 
 
-def test_scans_that_cannot_be_benched_are_refused(labelled: LabelledFrames) -> None:
+def test_scans_that_cannot_be_benched_are_refused(labelled) -> None:
     with pytest.raises(InputError, match="scans: there are none"):
         bench(["all"], [], labelled.card)
     labelled.frames[0].label_path.unlink()
@@ -170,20 +163,13 @@ def test_scans_that_cannot_be_benched_are_refused(labelled: LabelledFrames) -> N
 
 @pytest.mark.usefixtures("here")
 @pytest.mark.parametrize(("rain", "warned"), [((3,), False), ((9,), True)])
-def test_a_bench_without_rain_warns(
-    labelled: LabelledFrames,
-    capsys: pytest.CaptureFixture[str],
-    rain: tuple[int, ...],
-    warned: bool,
-) -> None:
+def test_a_bench_without_rain_warns(labelled, capsys, rain, warned) -> None:
     frames, card = labelled.frames[1:], replace(labelled.card, rain=rain, unknown=())
     bench(["none"], frames, card, **QUICK)
     assert ("no point of these scans is unknown" in capsys.readouterr().err) == warned
 
 
-def test_filters_share_one_search_and_score_as_they_would_alone(
-    labelled: LabelledFrames, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_filters_share_one_search_and_score_as_they_would_alone(labelled, monkeypatch) -> None:
     searches = []
     view = NeighbourView.__call__
 
@@ -202,7 +188,7 @@ def test_filters_share_one_search_and_score_as_they_would_alone(
 
 
 @pytest.mark.usefixtures("rainy")
-def test_every_model_is_followed_by_itself_by_the_other_runtime(tmp_path: Path) -> None:
+def test_every_model_is_followed_by_itself_by_the_other_runtime(tmp_path) -> None:
     low = parameters(tmp_path / "low.yaml", method=str(KEPT), threshold=0.25)
     rows = bench_entries([f"a={KEPT}", "dror", low], runtime=Runtime("rainy", "bf16"))
     titles = ["a", "a (rainy bf16)", "dror", "low", "low (rainy bf16)"]
@@ -217,7 +203,7 @@ def test_every_model_is_followed_by_itself_by_the_other_runtime(tmp_path: Path) 
 
 @pytest.mark.usefixtures("rainy", "here")
 def test_what_another_runtime_changes_is_counted_and_its_failure_is_stated(
-    labelled: LabelledFrames, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    labelled, tmp_path, monkeypatch
 ) -> None:
     model = load_method(str(KEPT), {}, 1, Runtime("rainy", "int2"))
     methods = {"mine": model, "all": "all"}

@@ -1,13 +1,12 @@
 """Intervals over scans: checked against drawing scans one by one, and where they must collapse."""
 
 import numpy as np
-import pytest
 
 from derain.export.bench import rows as module
 from derain.export.bench.rows import bootstrap
 
 
-def test_intervals_agree_with_drawing_scans_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_intervals_agree_with_drawing_scans_one_by_one(monkeypatch) -> None:
     monkeypatch.setattr(module, "DRAWS", 20_000)
     draws = generator(1)
     found, errors = draws.integers(0, 1000, (2, 3, 12))

@@ -8,12 +8,11 @@ import pytest
 
 from derain.export.bench.bench_entries import BenchEntry, bench_entries
 from derain.export.bench.cost import Timing, measure_cost
-from derain.export.bench.labelled_frames import LabelledFrames
 from derain.export.methods import load_method
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="peak memory is known on Linux alone")
-def test_a_process_of_its_own_holds_little_but_the_method(labelled: LabelledFrames) -> None:
+def test_a_process_of_its_own_holds_little_but_the_method(labelled) -> None:
     (row,) = bench_entries(["dsor"])
     held = np.ones(300_000_000, np.uint8)  # in this process, not in that one
     cost = measure_cost(row, Timing(labelled.frames[:1], threads=1, repeats=1))
@@ -22,7 +21,7 @@ def test_a_process_of_its_own_holds_little_but_the_method(labelled: LabelledFram
     assert held.nbytes / 2**20 > 250 > cost.peak_memory > 20
 
 
-def test_a_method_that_cannot_be_timed_states_why(labelled: LabelledFrames) -> None:
+def test_a_method_that_cannot_be_timed_states_why(labelled) -> None:
     broken = BenchEntry("broken", "outdet", partial(load_method, "moved.onnx", {}))
     cost = measure_cost(broken, Timing(labelled.frames, repeats=1))
     assert cost.failure is not None
@@ -31,7 +30,7 @@ def test_a_method_that_cannot_be_timed_states_why(labelled: LabelledFrames) -> N
     assert cost.peak_memory is None
 
 
-def test_what_only_this_program_knows_is_timed_in_its_process(labelled: LabelledFrames) -> None:
+def test_what_only_this_program_knows_is_timed_in_its_process(labelled) -> None:
     entries = bench_entries({"mine": lambda scan: scan.intensity < 4, "all": "all", "dror": "dror"})
     assert [entry.is_picklable for entry in entries] == [False, True, True]
     cost = measure_cost(entries[0], Timing(labelled.frames[:1], repeats=1))

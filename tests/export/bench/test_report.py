@@ -3,11 +3,9 @@
 import csv
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 from derain.evaluation.counts import Counts, or_none
@@ -45,7 +43,7 @@ def scored(methods: list[BenchEntry], data: LabelledFrames) -> list[Scores]:
 
 
 @pytest.fixture
-def rows(labelled: LabelledFrames) -> list[Row]:
+def rows(labelled) -> list[Row]:
     """A filter, a baseline, and a method that fails wherever it is run."""
 
     def broken(scan: object, stopwatch: object) -> np.ndarray:
@@ -57,7 +55,7 @@ def rows(labelled: LabelledFrames) -> list[Row]:
     return bench_rows(methods, scores, [cost(40), cost(4), failed], np.random.default_rng(0))
 
 
-def test_json_and_csv_hold_the_same_figures(rows: list[Row], tmp_path: Path) -> None:
+def test_json_and_csv_hold_the_same_figures(rows, tmp_path) -> None:
     write_report(rows, FACTS, tmp_path / "out")
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
         "bench.csv",
@@ -87,9 +85,7 @@ def test_json_and_csv_hold_the_same_figures(rows: list[Row], tmp_path: Path) -> 
     assert content["rows"][2]["by_range"]["80+ m"]["iou"] is None  # no point is as far
 
 
-def test_the_tables_name_every_method_what_failed_and_what_was_not_timed_alone(
-    rows: list[Row],
-) -> None:
+def test_the_tables_name_every_method_what_failed_and_what_was_not_timed_alone(rows) -> None:
     here = replace(rows[1], cost=replace(rows[1].cost, alone=False))
     text = as_markdown([rows[0], here, rows[2]], FACTS)
     parts = {part.splitlines()[0]: part for part in text.split("\n## ")}
@@ -106,9 +102,7 @@ def test_the_tables_name_every_method_what_failed_and_what_was_not_timed_alone(
     assert all(line.split()[-2] == "-" for line in by_range if "dror" in line)
 
 
-def test_simulated_data_are_called_so_and_one_scan_has_no_interval(
-    rows: list[Row], labelled: LabelledFrames
-) -> None:
+def test_simulated_data_are_called_so_and_one_scan_has_no_interval(rows, labelled) -> None:
     assert SIMULATED_IS_EASY not in as_markdown(rows, FACTS)
     assert SIMULATED_IS_EASY in as_markdown(rows, {**FACTS, "simulated": True})
     one = replace(labelled, frames=labelled.frames[:1])
@@ -119,7 +113,7 @@ def test_simulated_data_are_called_so_and_one_scan_has_no_interval(
 
 
 def test_the_picture_shows_methods_with_a_time_and_an_iou_and_how_large_files_are(
-    rows: list[Row], tmp_path: Path, saved_figures: list[Figure]
+    rows, tmp_path, saved_figures
 ) -> None:
     filter_, baseline, failed = rows
     of_file = replace(filter_, bench_entry=replace(filter_.bench_entry, facts={FILE_SIZE: 67_535}))

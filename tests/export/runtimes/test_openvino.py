@@ -55,7 +55,7 @@ MODELS = {
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_float32_is_onnxruntimes_on_every_hard_case(name: str) -> None:
+def test_float32_is_onnxruntimes_on_every_hard_case(name) -> None:
     checkpoint, model = MODELS[name]
     found = prove(load_model(checkpoint), model, HARD_CASES.items(), FLOAT32, OPENVINO)
     assert found.holds, str(found)
@@ -72,7 +72,7 @@ def test_bfloat16_is_near_on_every_hard_case() -> None:
     assert str(found).startswith("openvino bf16: ")
 
 
-def test_one_model_serves_several_threads_of_a_program(model: Derainer) -> None:
+def test_one_model_serves_several_threads_of_a_program(model) -> None:
     views = [model.view(Scan.of(scene(2000, seed))) for seed in range(8)]
     expected = [model.logits(view) for view in views]
     with ThreadPoolExecutor(4) as pool:
@@ -81,7 +81,7 @@ def test_one_model_serves_several_threads_of_a_program(model: Derainer) -> None:
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-def test_threads_and_precision_are_those_that_are_asked_for(threads: int) -> None:
+def test_threads_and_precision_are_those_that_are_asked_for(threads) -> None:
     network = Derainer(KEPT / "outdet.onnx", threads, "openvino").session.model
     assert network.get_property("INFERENCE_NUM_THREADS") == min(threads, usable_cores())
     assert network.get_property("NUM_STREAMS") == 1
@@ -89,7 +89,7 @@ def test_threads_and_precision_are_those_that_are_asked_for(threads: int) -> Non
     assert network.get_property("INFERENCE_PRECISION_HINT").to_dtype() == np.float32
 
 
-def test_a_graph_that_it_cannot_run_is_one_line(tmp_path: Path) -> None:
+def test_a_graph_that_it_cannot_run_is_one_line(tmp_path) -> None:
     proto = onnx.load(KEPT / "outdet.onnx")
     proto.graph.node[0].op_type = "Unheard"
     onnx.save(proto, tmp_path / "odd.onnx")
@@ -98,9 +98,7 @@ def test_a_graph_that_it_cannot_run_is_one_line(tmp_path: Path) -> None:
     assert "\n" not in str(refusal.value)
 
 
-def test_inputs_that_a_network_has_no_use_for_may_be_among_those_of_its_view(
-    tmp_path: Path,
-) -> None:
+def test_inputs_that_a_network_has_no_use_for_may_be_among_those_of_its_view(tmp_path) -> None:
     proto = onnx.load(KEPT / "outdet.onnx")
     weight = np.random.default_rng(0).normal(size=(4, 2)).astype(np.float32)
     del proto.graph.node[:], proto.graph.initializer[:]
@@ -117,7 +115,7 @@ def test_inputs_that_a_network_has_no_use_for_may_be_among_those_of_its_view(
     np.testing.assert_allclose(other.logits(view), usual.logits(view), rtol=1e-5, atol=1e-4)
 
 
-def test_a_processor_without_bfloat16_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_processor_without_bfloat16_is_told(monkeypatch) -> None:
     # OpenVINO's own way to make little of a processor; read when it is loaded.
     monkeypatch.setenv("OV_CPU_MAX_ISA", "AVX2")
     code = "import sys; from derain.cli.main import main; sys.exit(main(sys.argv[1:]))"
@@ -132,7 +130,7 @@ def test_a_processor_without_bfloat16_is_told(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_it_asks_nothing_of_the_network_writes_nothing_and_needs_no_onnxruntime(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path, monkeypatch
 ) -> None:
     monkeypatch.setenv("HOME", str(tmp_path))
     script = """

@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -29,9 +28,7 @@ print("done")
 
 
 @pytest.mark.parametrize("before", [False, True])
-def test_it_reports_nothing_and_leaves_its_telemetry_to_others(
-    tmp_path: Path, before: bool
-) -> None:
+def test_it_reports_nothing_and_leaves_its_telemetry_to_others(tmp_path, before) -> None:
     (tmp_path / "openvino.py").write_text(OPENVINO)
     (tmp_path / "openvino_telemetry").mkdir()
     for name in ("__init__", "backend"):

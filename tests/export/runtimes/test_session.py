@@ -20,7 +20,7 @@ from derain.export.methods import load_method
 from derain.export.model_file import ModelFile
 from derain.export.runtime import Derainer
 from derain.export.runtimes.onnx_runtime import WRONG_FUSION
-from derain.export.runtimes.session import RUNTIMES, Runtime, Session, TensorType
+from derain.export.runtimes.session import RUNTIMES, Runtime, TensorType
 from derain.export.timing import versions
 from derain.models.checkpoint import load_model
 from derain.scan import Scan
@@ -53,7 +53,7 @@ def test_onnxruntime_in_float32_is_what_runs_a_model_unless_another_is_named() -
     ],
 )
 def test_what_no_runtime_has_is_refused_with_what_there_is(
-    monkeypatch: pytest.MonkeyPatch, runtime: str, precision: str, line: str
+    monkeypatch, runtime, precision, line
 ) -> None:
     monkeypatch.setitem(sys.modules, "openvino", None)  # importing it is an ImportError
     with pytest.raises(InputError) as refusal:
@@ -61,7 +61,7 @@ def test_what_no_runtime_has_is_refused_with_what_there_is(
     assert str(refusal.value).endswith(line)
 
 
-def test_a_runtime_of_another_package_is_given_threads_and_precision(rainy: type[Session]) -> None:
+def test_a_runtime_of_another_package_is_given_threads_and_precision(rainy) -> None:
     derainer = Derainer(KEPT, 2, "rainy", "int2")
     assert isinstance(derainer.session, rainy)
     assert derainer.session.settings == (2, "int2")
@@ -86,16 +86,14 @@ def test_a_runtime_of_another_package_is_given_threads_and_precision(rainy: type
     ],
 )
 def test_what_a_network_takes_and_gives_is_checked_whatever_runs_it(
-    rainy: type[Session], monkeypatch: pytest.MonkeyPatch, name: str, value: object
+    rainy, monkeypatch, name, value
 ) -> None:
     monkeypatch.setattr(rainy, name, value)
     with pytest.raises(InputError, match=r"outdet\.onnx: its network takes"):
         Derainer(KEPT, 1, "rainy")
 
 
-def test_a_runtime_that_drops_inputs_may_show_fewer_of_the_right_types(
-    rainy: type[Session], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_runtime_that_drops_inputs_may_show_fewer_of_the_right_types(rainy, monkeypatch) -> None:
     monkeypatch.setattr(rainy, "DROPS_UNUSED_INPUTS", True)
     monkeypatch.setattr(rainy, "inputs", {"points": INPUTS["points"]})
     Derainer(KEPT, 1, "rainy")
@@ -105,7 +103,7 @@ def test_a_runtime_that_drops_inputs_may_show_fewer_of_the_right_types(
 
 
 def test_an_export_for_another_runtime_is_proved_by_that_as_well(
-    rainy: type[Session], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    rainy, monkeypatch, tmp_path
 ) -> None:
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(300)))])
     # The graph need not be traced anew.
@@ -120,9 +118,7 @@ def test_an_export_for_another_runtime_is_proved_by_that_as_well(
     assert Derainer(path, 1).metadata["proof"] == proof.as_dict()
 
 
-def test_the_versions_name_each_package_that_ran_once(
-    rainy: type[Session], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_versions_name_each_package_that_ran_once(rainy, monkeypatch) -> None:
     for version in (
         f"; derain {derain.__version__}, onnxruntime {onnxruntime.__version__}, ",
         f"NumPy {np.__version__}, Python {platform.python_version()}",
@@ -134,9 +130,7 @@ def test_the_versions_name_each_package_that_ran_once(
     assert "rain-under-another-name, NumPy" in versions(["rainy"])
 
 
-def test_a_network_that_earlier_versions_fuse_wrongly_is_opened_without_that(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_network_that_earlier_versions_fuse_wrongly_is_opened_without_that(monkeypatch) -> None:
     usual = onnxruntime.InferenceSession
 
     def earlier(*arguments: Any, disabled_optimizers: tuple[str, ...] = (), **options: Any) -> Any:

@@ -15,7 +15,7 @@ SIX = (*FIVE, "time")
 
 
 @pytest.fixture
-def file(tmp_path: Path) -> Path:
+def file(tmp_path) -> Path:
     return tmp_path / "scan.bin"
 
 
@@ -31,7 +31,7 @@ def street(points: int, width: int, azimuth: float = np.pi) -> NDArray[np.float3
     return np.column_stack([*rows, ring, time, *[ring] * 4])[:, :width].astype(np.float32)
 
 
-def test_a_file_is_whole_rows_or_empty(file: Path) -> None:
+def test_a_file_is_whole_rows_or_empty(file) -> None:
     file.write_bytes(bytes(50))
     with pytest.raises(InputError, match=r"50 bytes are not whole rows of 16 bytes.*--columns"):
         read_scan(file)
@@ -51,16 +51,14 @@ def test_a_file_is_whole_rows_or_empty(file: Path) -> None:
     ("width", "columns"), [*((wide, DEFAULT_COLUMNS) for wide in (5, 6, 7)), (4, FIVE)]
 )
 @pytest.mark.parametrize("azimuth", [np.pi, np.pi / 3], ids=["full circle", "front"])
-def test_rows_of_another_width_than_stated_are_refused(
-    file: Path, width: int, columns: tuple[str, ...], azimuth: float
-) -> None:
+def test_rows_of_another_width_than_stated_are_refused(file, width, columns, azimuth) -> None:
     file.write_bytes(street(2000, width, azimuth).tobytes())
     with pytest.raises(InputError, match=r"more columns than stated.*--columns x,y,z,intensity"):
         read_scan(file, columns)
 
 
 def test_sentinel_cells_damaged_rows_and_a_few_negative_values_are_no_reason_to_refuse(
-    file: Path,
+    file,
 ) -> None:
     rows = street(1000, 4)
     rows[:400] = -1
@@ -73,7 +71,7 @@ def test_sentinel_cells_damaged_rows_and_a_few_negative_values_are_no_reason_to_
     assert read_scan(file, ("x", "y", "z", "rcs")).intensity is None
 
 
-def test_a_column_that_would_lose_digits_is_not_written(file: Path) -> None:
+def test_a_column_that_would_lose_digits_is_not_written(file) -> None:
     fields = {axis: np.ones(2, np.float32) for axis in "xyz"} | {"time": np.array([1, 2**24 + 1])}
     with pytest.raises(InputError, match=r"float32 cannot hold the column time \(int64\)"):
         write_scan(file, Scan(np.ones((2, 3), np.float32), fields=fields))
@@ -82,9 +80,7 @@ def test_a_column_that_would_lose_digits_is_not_written(file: Path) -> None:
 
 @pytest.mark.parametrize("columns", [("z", "y", "x", "intensity"), FIVE, SIX], ids=len)
 @pytest.mark.parametrize("origin", [np.float32, np.float64])
-def test_float64_is_told_from_float32_and_written_back(
-    file: Path, columns: tuple[str, ...], origin: type
-) -> None:
+def test_float64_is_told_from_float32_and_written_back(file, columns, origin) -> None:
     # What was float32 before has 29 bits of zeros behind each number.
     rows = (street(2000, len(columns)).astype(np.float64) * np.pi).astype(origin).astype("<f8")
     file.write_bytes(rows.tobytes())
@@ -98,7 +94,7 @@ def test_float64_is_told_from_float32_and_written_back(
 
 
 @pytest.mark.parametrize("columns", [DEFAULT_COLUMNS, FIVE, SIX], ids=len)
-def test_float32_is_not_taken_for_float64(file: Path, columns: tuple[str, ...]) -> None:
+def test_float32_is_not_taken_for_float64(file, columns) -> None:
     rows = street(2000, len(columns))
     for damaged in (rows, np.where(np.arange(2000)[:, None] % 2 == 0, np.float32(1e-40), rows)):
         file.write_bytes(damaged.astype("<f4").tobytes())
@@ -107,7 +103,7 @@ def test_float32_is_not_taken_for_float64(file: Path, columns: tuple[str, ...]) 
         assert Binary().count(file, columns) == 2000
 
 
-def test_float64_that_makes_as_good_sense_as_float32_stays_float32(file: Path) -> None:
+def test_float64_that_makes_as_good_sense_as_float32_stays_float32(file) -> None:
     # Whole numbers, which have nothing but zeros in the half that float32 would stumble over.
     rows = np.random.default_rng(0).integers(1, 60, (100, 4)).astype("<f8")
     file.write_bytes(rows.tobytes())

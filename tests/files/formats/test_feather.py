@@ -1,7 +1,6 @@
 """Feather files, as Argoverse 2 has them: every column comes back, numbers or not."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pyarrow
@@ -35,7 +34,7 @@ def table() -> pyarrow.Table:
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
 def test_a_file_comes_back_byte_for_byte_and_cleaned_without_the_other_rows(
-    tmp_path: Path, table: pyarrow.Table, compression: str
+    tmp_path, table, compression
 ) -> None:
     path = tmp_path / "scan.feather"
     feather.write_feather(table, str(path), compression)
@@ -54,9 +53,7 @@ def test_a_file_comes_back_byte_for_byte_and_cleaned_without_the_other_rows(
     assert feather.read_table(str(path)).equals(table.filter(stay), check_metadata=True)
 
 
-def test_columns_that_were_changed_are_written_and_others_kept(
-    tmp_path: Path, table: pyarrow.Table
-) -> None:
+def test_columns_that_were_changed_are_written_and_others_kept(tmp_path, table) -> None:
     path = tmp_path / "scan.feather"
     feather.write_feather(table, str(path))
     scan = read_scan(path)
@@ -70,7 +67,7 @@ def test_columns_that_were_changed_are_written_and_others_kept(
     assert copy.drop(["x", "new"]).equals(table.drop(["x"]))
 
 
-def test_version_1_is_refused(tmp_path: Path) -> None:
+def test_version_1_is_refused(tmp_path) -> None:
     path = tmp_path / "scan.feather"
     path.write_bytes(b"FEA1" + bytes(100))
     with pytest.raises(InputError, match="version 2"):

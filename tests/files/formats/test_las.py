@@ -49,7 +49,7 @@ STREET = millimetres((1, -2, 3), (30_001, -40_002, 1_700), (-(2**31), 2**31 - 1,
 @pytest.mark.parametrize("version", ["1.2", "1.4"])
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_coordinates_are_relative_to_the_offset_and_the_file_comes_back_whole_or_cleaned(
-    tmp_path: Path, suffix: str, version: str
+    tmp_path, suffix, version
 ) -> None:
     path = tmp_path / f"scan{suffix}"
     las = write(path, STREET, version=version)
@@ -70,7 +70,7 @@ def test_coordinates_are_relative_to_the_offset_and_the_file_comes_back_whole_or
     assert [record.record_data for record in cleaned.evlrs or []] == behind
 
 
-def test_a_survey_without_an_offset_keeps_its_millimetres(tmp_path: Path) -> None:
+def test_a_survey_without_an_offset_keeps_its_millimetres(tmp_path) -> None:
     path = tmp_path / "scan.las"
     whole = STREET[[0, 1, 3]] + np.array([500_000_000, 1_900_000_000, 0], np.int32)
     write(path, whole, (0.0, 0.0, 0.0))
@@ -82,7 +82,7 @@ def test_a_survey_without_an_offset_keeps_its_millimetres(tmp_path: Path) -> Non
     assert (tmp_path / "copy.las").read_bytes() == path.read_bytes()
 
 
-def test_survey_points_in_many_chunks_come_back(tmp_path: Path) -> None:
+def test_survey_points_in_many_chunks_come_back(tmp_path) -> None:
     path = tmp_path / "scan.laz"
     whole = np.random.default_rng(0).integers(-(10**6), 10**6, (120_000, 3)).astype(np.int32)
     write(path, whole)
@@ -90,7 +90,7 @@ def test_survey_points_in_many_chunks_come_back(tmp_path: Path) -> None:
     np.testing.assert_array_equal(np.rint(scan.xyz * 1000), whole)
 
 
-def test_what_no_las_can_hold_is_refused(tmp_path: Path) -> None:
+def test_what_no_las_can_hold_is_refused(tmp_path) -> None:
     path = tmp_path / "scan.las"
     write(path, STREET)
     scan = read_scan(path)
@@ -114,7 +114,7 @@ def test_what_no_las_can_hold_is_refused(tmp_path: Path) -> None:
     [(".las", "laspy", "las"), (".laz", "laspy", "las"), (".feather", "pyarrow", "feather")],
 )
 def test_a_library_that_is_not_installed_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str, library: str, extra: str
+    tmp_path, monkeypatch, suffix, library, extra
 ) -> None:
     monkeypatch.setitem(sys.modules, library, None)
     path = tmp_path / f"scan{suffix}"
@@ -126,7 +126,7 @@ def test_a_library_that_is_not_installed_is_named(
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_a_further_column_becomes_an_extra_dimension(tmp_path: Path, suffix: str) -> None:
+def test_a_further_column_becomes_an_extra_dimension(tmp_path, suffix) -> None:
     path = tmp_path / f"scan{suffix}"
     las = write(path, STREET)
     scan = read_scan(path)
@@ -142,7 +142,7 @@ def test_a_further_column_becomes_an_extra_dimension(tmp_path: Path, suffix: str
     assert (tmp_path / f"copy{suffix}").read_bytes() == path.read_bytes()
 
 
-def test_fewer_points_than_the_header_states_are_refused(tmp_path: Path) -> None:
+def test_fewer_points_than_the_header_states_are_refused(tmp_path) -> None:
     path = tmp_path / "scan.las"
     survey = write(path, STREET, version="1.2")
     path.write_bytes(path.read_bytes()[: -survey.header.point_format.size])

@@ -4,7 +4,6 @@ import pickle
 import re
 import zipfile
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,7 +30,7 @@ def organised() -> dict[str, np.ndarray]:
 
 
 def test_organised_arrays_are_flattened_row_by_row_and_come_back_as_they_were(
-    tmp_path: Path, organised: dict[str, np.ndarray]
+    tmp_path, organised
 ) -> None:
     with zipfile.ZipFile(tmp_path / "scan.npz", "w") as archive:
         for name, array in organised.items():
@@ -61,9 +60,7 @@ def test_organised_arrays_are_flattened_row_by_row_and_come_back_as_they_were(
         [("xyz", "f4", (3,)), ("i", "f4")],
     ],
 )
-def test_a_structured_array_keeps_names_types_and_grid(
-    tmp_path: Path, suffix: str, row: list[Any]
-) -> None:
+def test_a_structured_array_keeps_names_types_and_grid(tmp_path, suffix, row) -> None:
     table = np.zeros((2, 3), row)
     table["i"] = np.arange(6).reshape(2, 3)
     path = tmp_path / f"scan{suffix}"
@@ -82,7 +79,7 @@ class Fuse:
         return pytest.fail, ("a pickle was executed",)
 
 
-def test_pickles_are_never_executed(tmp_path: Path) -> None:
+def test_pickles_are_never_executed(tmp_path) -> None:
     array = np.array([Fuse()], object)
     np.save(tmp_path / "scan.npy", array, allow_pickle=True)
     np.savez(tmp_path / "scan.npz", xyz=array, allow_pickle=True)
@@ -104,7 +101,7 @@ def test_pickles_are_never_executed(tmp_path: Path) -> None:
         {"xyz": np.zeros(3)},
     ],
 )
-def test_arrays_that_are_no_points_are_refused(tmp_path: Path, arrays: Any) -> None:
+def test_arrays_that_are_no_points_are_refused(tmp_path, arrays) -> None:
     if isinstance(arrays, dict):
         np.savez(path := tmp_path / "scan.npz", **arrays)
     else:
@@ -115,9 +112,7 @@ def test_arrays_that_are_no_points_are_refused(tmp_path: Path, arrays: Any) -> N
 
 @pytest.mark.parametrize("name", ["", "points", "Points", "arr_0", "cloud"])
 @pytest.mark.parametrize("shape", [(6, 4), (2, 3, 4), (0, 4)])
-def test_a_table_alone_is_read_and_comes_back_with_its_grid(
-    tmp_path: Path, name: str, shape: tuple[int, ...]
-) -> None:
+def test_a_table_alone_is_read_and_comes_back_with_its_grid(tmp_path, name, shape) -> None:
     rows = np.arange(np.prod(shape), dtype=">f8").reshape(shape)
     path = tmp_path / ("scan.npz" if name else "scan.npy")
     np.savez(path, **{name: rows}) if name else np.save(path, rows)
@@ -130,7 +125,7 @@ def test_a_table_alone_is_read_and_comes_back_with_its_grid(
     np.testing.assert_array_equal(copy[name] if name else copy, rows, strict=True)
 
 
-def test_points_may_have_further_arrays_beside_them(tmp_path: Path) -> None:
+def test_points_may_have_further_arrays_beside_them(tmp_path) -> None:
     points = np.arange(24, dtype=np.float32).reshape(2, 3, 4)
     ring, time, beams = np.arange(6).reshape(2, 3), np.array([5, 6, 7]), np.array([-1.5, 1.5])
     np.savez(tmp_path / "scan.npz", ring=ring, points=points, time=time, beams=beams)
@@ -155,7 +150,7 @@ def test_points_may_have_further_arrays_beside_them(tmp_path: Path) -> None:
 @pytest.mark.parametrize("names", [("x", "y", "z"), ("x", "y", "z", "intensity")])
 @pytest.mark.parametrize("from_file", [False, True])
 def test_coordinates_in_one_array_and_scans_from_no_file_are_written_in_every_format(
-    tmp_path: Path, suffix: str, names: tuple[str, ...], from_file: bool
+    tmp_path, suffix, names, from_file
 ) -> None:
     xyz, intensity = np.arange(6, dtype=np.float32).reshape(2, 3), np.array([7, 8], np.float32)
     arrays = {"xyz": xyz, **({"intensity": intensity} if "intensity" in names else {})}

@@ -4,7 +4,6 @@ import math
 import struct
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import lzf
 import numpy as np
@@ -33,7 +32,7 @@ DATA = b"".join(ROW.pack(*point) for point in POINTS)
 
 
 @pytest.fixture
-def file(tmp_path: Path) -> Path:
+def file(tmp_path) -> Path:
     return tmp_path / "scan.pcd"
 
 
@@ -74,11 +73,11 @@ def check_points(scan: Scan) -> None:
         ("binary", DATA + b"\n"),
     ],
 )
-def test_every_encoding_is_read(file: Path, encoding: str, data: bytes) -> None:
+def test_every_encoding_is_read(file, encoding, data) -> None:
     check_points(read_scan(write(file, HEADER.replace("DATA binary", f"DATA {encoding}"), data)))
 
 
-def test_headers_may_lack_what_is_optional_and_hold_comments_in_any_encoding(file: Path) -> None:
+def test_headers_may_lack_what_is_optional_and_hold_comments_in_any_encoding(file) -> None:
     optional = ("COUNT", "HEIGHT", "POINTS", "VIEWPOINT")
     lines = [line for line in HEADER.splitlines() if not line.startswith(optional)]
     header = b"\r\n".join([b"# Stra\xdfe", b"", *(line.encode() for line in lines), b""])
@@ -89,7 +88,7 @@ def test_headers_may_lack_what_is_optional_and_hold_comments_in_any_encoding(fil
     assert b"VIEWPOINT 0 0 0 1 0 0 0\n" in file.read_bytes()
 
 
-def test_padding_is_passed_over_in_every_encoding(file: Path) -> None:
+def test_padding_is_passed_over_in_every_encoding(file) -> None:
     header = (
         HEADER.replace("FIELDS x y z", "FIELDS x y z _")
         .replace("SIZE 4 4 4", "SIZE 4 4 4 1")
@@ -116,7 +115,7 @@ def test_padding_is_passed_over_in_every_encoding(file: Path) -> None:
 
 @pytest.mark.parametrize("encoding", ENCODINGS)
 def test_encoding_viewpoint_and_order_of_columns_survive_and_the_grid_until_it_is_cleaned(
-    file: Path, scan: Scan, encoding: str
+    file, scan, encoding
 ) -> None:
     header = PcdHeader((), 0, 0, 0, encoding, "1 2 3 0.5 0.5 0.5 0.5")
     write_scan(file, replace(scan.take(np.arange(4)), shape=(2, 2), header=header))
@@ -133,9 +132,7 @@ def test_encoding_viewpoint_and_order_of_columns_survive_and_the_grid_until_it_i
 
 
 @pytest.mark.parametrize("encoding", ENCODINGS)
-def test_open3d_reads_what_is_written(
-    file: Path, scan: Scan, columns: dict[str, Any], encoding: str, open3d: Any
-) -> None:
+def test_open3d_reads_what_is_written(file, scan, columns, encoding, open3d) -> None:
     write_scan(file, replace(scan, header=PcdHeader((), 0, 0, 0, encoding)))
     cloud = open3d.t.io.read_point_cloud(str(file))
     np.testing.assert_array_equal(cloud.point["positions"].numpy(), scan.xyz, strict=True)
@@ -151,9 +148,7 @@ def test_open3d_reads_what_is_written(
         ("WIDTH 1\nHEIGHT 1\nPOINTS 1", None),
     ],
 )
-def test_a_wrong_number_of_points_is_overruled_by_the_data(
-    file: Path, stated: str, shape: tuple[int, int] | None
-) -> None:
+def test_a_wrong_number_of_points_is_overruled_by_the_data(file, stated, shape) -> None:
     header = HEADER.replace("HEIGHT 1\n", "").replace("POINTS 2\n", "").replace("WIDTH 2", stated)
     for encoding, data in ENCODED.items():
         scan = read_scan(write(file, header.replace("DATA binary", f"DATA {encoding}"), data))
@@ -171,9 +166,7 @@ def test_a_wrong_number_of_points_is_overruled_by_the_data(
         ("binary_compressed", struct.pack("<II", 2, 28) + b"\0A"),
     ],
 )
-def test_data_that_do_not_match_the_header_are_refused(
-    file: Path, encoding: str, data: bytes
-) -> None:
+def test_data_that_do_not_match_the_header_are_refused(file, encoding, data) -> None:
     header = HEADER.replace("DATA binary", f"DATA {encoding}")
     with pytest.raises(InputError, match=r"scan\.pcd: cannot be read as \.pcd \(.*write it again"):
         read_scan(write(file, header, data))
@@ -194,7 +187,7 @@ def test_data_that_do_not_match_the_header_are_refused(
         ("WIDTH 2", "WIDTH 2.5"),
     ],
 )
-def test_headers_that_make_no_sense_are_refused(file: Path, old: str, new: str) -> None:
+def test_headers_that_make_no_sense_are_refused(file, old, new) -> None:
     assert old in HEADER
     with pytest.raises(InputError, match=r"read as \.pcd \(the header (states|has no) "):
         read_scan(write(file, HEADER.replace(old, new), DATA))

@@ -3,7 +3,6 @@
 import struct
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -30,7 +29,7 @@ DATA = b"1.5 -2 0.1 7\nnan inf -0 255\n3 0 1 1\n"
 
 
 @pytest.fixture
-def file(tmp_path: Path) -> Path:
+def file(tmp_path) -> Path:
     return tmp_path / "scan.ply"
 
 
@@ -55,14 +54,14 @@ def binary(order: str) -> bytes:
 
 
 @pytest.mark.parametrize("encoding", BYTE_ORDERS)
-def test_every_encoding_is_read(file: Path, encoding: str) -> None:
+def test_every_encoding_is_read(file, encoding) -> None:
     header = HEADER.replace("ascii", encoding)
     data = DATA if encoding == "ascii" else binary(BYTE_ORDERS[encoding])
     check_points(read_scan(write(file, header, data)))
     check_points(read_scan(write(file, header.replace("\n", "\r\n"), data)))
 
 
-def test_elements_before_the_vertices_are_passed_over(file: Path) -> None:
+def test_elements_before_the_vertices_are_passed_over(file) -> None:
     camera = "element camera 2\nproperty double angle\nproperty short id\nelement vertex"
     header = HEADER.replace("element vertex", camera)
     check_points(read_scan(write(file, header, b"1 2\n3 4\n" + DATA)))
@@ -70,7 +69,7 @@ def test_elements_before_the_vertices_are_passed_over(file: Path) -> None:
     check_points(read_scan(write(file, header.replace("ascii", "binary_little_endian"), data)))
 
 
-def test_a_cleaned_cloud_keeps_its_comments(file: Path) -> None:
+def test_a_cleaned_cloud_keeps_its_comments(file) -> None:
     scan = read_scan(write(file, HEADER, DATA))
     write_scan(file, scan.take(np.array([True, False])))
     assert file.read_text("utf-8").splitlines()[2:5] == [
@@ -79,7 +78,7 @@ def test_a_cleaned_cloud_keeps_its_comments(file: Path) -> None:
 
 
 @pytest.mark.parametrize("encoding", BYTE_ORDERS)
-def test_open3d_reads_what_is_written(file: Path, scan: Scan, encoding: str, open3d: Any) -> None:
+def test_open3d_reads_what_is_written(file, scan, encoding, open3d) -> None:
     # Open3D skips properties of 16 bits.
     fields = {name: column for name, column in scan.fields.items() if name != "ring"}
     write_scan(file, replace(scan, fields=fields, header=PlyHeader(encoding)))
@@ -107,7 +106,7 @@ def test_open3d_reads_what_is_written(file: Path, scan: Scan, encoding: str, ope
         (HEADER.replace("ply", "obj"), DATA),
     ],
 )
-def test_damaged_files_are_refused(file: Path, header: str, data: bytes) -> None:
+def test_damaged_files_are_refused(file, header, data) -> None:
     with pytest.raises(InputError, match=r"scan\.ply: cannot be read as \.ply \(.*write it again"):
         read_scan(write(file, header, data))
 
@@ -144,7 +143,7 @@ def left_out(path: Path) -> tuple[str, ...]:
 
 
 @pytest.mark.parametrize("encoding", BYTE_ORDERS)
-def test_a_mesh_that_loses_nothing_comes_back_byte_for_byte(tmp_path: Path, encoding: str) -> None:
+def test_a_mesh_that_loses_nothing_comes_back_byte_for_byte(tmp_path, encoding) -> None:
     path = tmp_path / "mesh.ply"
     path.write_bytes(mesh(TRIANGLES, encoding))
     assert left_out(path) == ()
@@ -158,9 +157,7 @@ def test_a_mesh_that_loses_nothing_comes_back_byte_for_byte(tmp_path: Path, enco
 
 
 @pytest.mark.parametrize("encoding", BYTE_ORDERS)
-def test_faces_of_vertices_that_stay_are_renumbered(
-    tmp_path: Path, encoding: str, open3d: Any
-) -> None:
+def test_faces_of_vertices_that_stay_are_renumbered(tmp_path, encoding, open3d) -> None:
     path = tmp_path / "mesh.ply"
     path.write_bytes(mesh(TRIANGLES, encoding))
     stay = np.array([True, False, True, True, True, True])
@@ -175,16 +172,14 @@ def test_faces_of_vertices_that_stay_are_renumbered(
     assert read_scan(path).header.faces.table["red"].tolist() == [1, 2]
 
 
-def test_faces_of_another_cloud_are_not_written(file: Path) -> None:
+def test_faces_of_another_cloud_are_not_written(file) -> None:
     file.write_bytes(mesh(TRIANGLES, "ascii"))
     of_mesh = read_scan(file)
     write_scan(file, Scan(of_mesh.xyz[:2], header=of_mesh.header))
     assert b"face" not in file.read_bytes()
 
 
-def test_faces_follow_vertices_in_any_order_and_the_first_of_those_taken_twice(
-    tmp_path: Path,
-) -> None:
+def test_faces_follow_vertices_in_any_order_and_the_first_of_those_taken_twice(tmp_path) -> None:
     path = tmp_path / "mesh.ply"
     path.write_bytes(mesh(TRIANGLES, "ascii"))
     scan = read_scan(path)
@@ -202,7 +197,7 @@ def test_faces_follow_vertices_in_any_order_and_the_first_of_those_taken_twice(
     [([*TRIANGLES, (0, 1, 2, 3)], 0), ([(0, 1, 6)], 0), ([(0, 1, -1)], 0), (TRIANGLES, 12)],
 )
 def test_faces_that_cannot_follow_are_left_out_and_said_to_be(
-    tmp_path: Path, encoding: str, faces: list[tuple[int, ...]], cut: int
+    tmp_path, encoding, faces, cut
 ) -> None:
     path = tmp_path / "mesh.ply"
     content = mesh(faces, encoding)

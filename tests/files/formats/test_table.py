@@ -1,6 +1,5 @@
 """CSV tables of points: what is read, what is refused, and that every value comes back."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,7 +22,7 @@ x,y,z,intensity,cross_section,velocity,confidence
 
 
 @pytest.fixture
-def file(tmp_path: Path) -> Path:
+def file(tmp_path) -> Path:
     return tmp_path / "scan.csv"
 
 
@@ -32,7 +31,7 @@ def read(file: Path, text: str | bytes) -> Scan:
     return read_scan(file)
 
 
-def test_the_extended_radar_of_rehearse_3d_is_read(file: Path) -> None:
+def test_the_extended_radar_of_rehearse_3d_is_read(file) -> None:
     scan = read(file, EXTENDED_RADAR)
     expected = np.array([[12.5, -3.25, 0.5], [10, np.nan, -0.0]], np.float32)
     np.testing.assert_array_equal(scan.xyz, expected, strict=True)
@@ -59,9 +58,7 @@ def test_the_extended_radar_of_rehearse_3d_is_read(file: Path) -> None:
     ],
     ids=["spaces", "empty lines", "byte order mark", "quotes"],
 )
-def test_the_many_ways_to_write_a_table_make_no_difference(
-    file: Path, written: Callable[[str], str]
-) -> None:
+def test_the_many_ways_to_write_a_table_make_no_difference(file, written) -> None:
     expected = read(file, EXTENDED_RADAR)
     scan = read(file, written(EXTENDED_RADAR))
     assert list(scan.fields) == list(expected.fields)
@@ -72,7 +69,7 @@ def test_the_many_ways_to_write_a_table_make_no_difference(
 @pytest.mark.parametrize(
     ("text", "last"), [("x,y,z,velocity\n", "velocity"), ("", "intensity"), (" \n\n", "intensity")]
 )
-def test_names_alone_or_nothing_are_a_scan_of_no_points(file: Path, text: str, last: str) -> None:
+def test_names_alone_or_nothing_are_a_scan_of_no_points(file, text, last) -> None:
     scan = read(file, text)
     assert (len(scan), list(scan.fields)) == (0, ["x", "y", "z", last])
     assert {column.dtype for column in scan.fields.values()} == {np.dtype(np.float64)}
@@ -92,7 +89,7 @@ def test_names_alone_or_nothing_are_a_scan_of_no_points(file: Path, text: str, l
         (bytes(range(256)), "has no x, y and z among its columns|cannot be read as .csv"),
     ],
 )
-def test_what_is_no_table_of_points_is_refused(file: Path, text: str | bytes, reason: str) -> None:
+def test_what_is_no_table_of_points_is_refused(file, text, reason) -> None:
     with pytest.raises(InputError, match=reason) as refusal:
         read(file, text)
     assert refusal.value.subject in (file, str(file))
@@ -104,9 +101,7 @@ ROWS = [["1", "2.5", "-3", "4"], ["nan", "1e-3", ".5", "+1"]]
 @pytest.mark.parametrize("suffix", [".csv", ".xyz"])
 @pytest.mark.parametrize("separator", [",", " ; ", " ", "\t", "   "])
 @pytest.mark.parametrize("names", ["", "y x z ring", "# y x z ring", "//y x z ring"])
-def test_text_is_read_with_names_or_with_columns_stated(
-    tmp_path: Path, suffix: str, separator: str, names: str
-) -> None:
+def test_text_is_read_with_names_or_with_columns_stated(tmp_path, suffix, separator, names) -> None:
     file = tmp_path / f"scan{suffix}"
     lines = [separator.join(names.replace("# ", "#").split())] if names else []
     file.write_text("\n".join(lines + [separator.join(row) for row in ROWS]) + "\n")
@@ -126,7 +121,7 @@ def test_text_is_read_with_names_or_with_columns_stated(
     ],
 )
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
-def test_lines_that_stay_are_written_as_they_were(file: Path, values: list[str], end: str) -> None:
+def test_lines_that_stay_are_written_as_they_were(file, values, end) -> None:
     lines = ["\ufeffx,y,z, a b ", *(f"{value},{value},{value},{value}" for value in values)]
     scan = read(file, end.join(lines).encode())
     stay = np.arange(len(values)) % 3 != 1
@@ -137,7 +132,7 @@ def test_lines_that_stay_are_written_as_they_were(file: Path, values: list[str],
     assert file.read_bytes().decode().split(end) == [lines[0], lines[3], lines[1], ""]
 
 
-def test_lines_whose_numbers_were_changed_are_written_anew(file: Path) -> None:
+def test_lines_whose_numbers_were_changed_are_written_anew(file) -> None:
     scan = read(file, "0.50 1 2 7\n3 4 5 8\n")
     fields = {**scan.fields, "intensity": np.array([7, 9])}
     write_scan(file, replace(scan, fields=fields))
@@ -155,7 +150,7 @@ NUMBERS = st.sampled_from(
 
 
 @given(st.lists(NUMBERS, min_size=1, max_size=5))
-def test_how_many_lines_are_parsed_at_a_time_changes_nothing(texts: list[str]) -> None:
+def test_how_many_lines_are_parsed_at_a_time_changes_nothing(texts) -> None:
     lines = "".join(f"{text},0,0,0\n" for text in ["1", *texts])
     content = Content(Path("scan.csv"), lines.encode(), MemoryBudget(0))
     whole = Table().decode(content, ("x", "y", "z", "i")).fields["x"]

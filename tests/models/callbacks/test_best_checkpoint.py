@@ -14,7 +14,6 @@ from torch import Tensor
 from derain.models.callbacks.best_checkpoint import BestCheckpoint
 from derain.models.callbacks.resumption import Resumption
 
-MakeTrainer = Callable[..., lightning.Trainer]
 Fit = Callable[..., ModelCheckpoint]
 
 
@@ -41,7 +40,7 @@ class Counter(lightning.LightningModule):
 
 
 @pytest.fixture
-def fit(make_trainer: MakeTrainer, tmp_path: Path) -> Fit:
+def fit(make_trainer, tmp_path) -> Fit:
     """Trains up to an epoch in a folder, from the last checkpoint of another one if it is named."""
 
     def run(
@@ -93,12 +92,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 )
 @pytest.mark.parametrize("scores", [(3.0, 1.0, 2.0), (2.0, 3.0, 1.0)])
 def test_the_best_epochs_are_those_of_an_unbroken_run(
-    fit: Fit,
-    tmp_path: Path,
-    scores: tuple[float, ...],
-    mode: str,
-    top: int,
-    writer: type[ModelCheckpoint],
+    fit, tmp_path, scores, mode, top, writer
 ) -> None:
     options = {"mode": mode, "save_top_k": top, "filename": "{epoch}"}
     unbroken = fit("unbroken", 3, scores, **options)
@@ -124,9 +118,7 @@ def test_the_best_epochs_are_those_of_an_unbroken_run(
     ],
 )
 @pytest.mark.parametrize("folder", ["runs/first", "runs/second"])
-def test_no_file_is_lost_that_a_checkpoint_names(
-    fit: Fit, tmp_path: Path, folder: str, named: str, filename: str
-) -> None:
+def test_no_file_is_lost_that_a_checkpoint_names(fit, tmp_path, folder, named, filename) -> None:
     scores = (1.0, 2.0, 3.0)
     run = tmp_path / "runs/first"
     fit("runs/first", 1, scores, mode="max", filename=filename)
@@ -145,9 +137,7 @@ def test_no_file_is_lost_that_a_checkpoint_names(
     assert torch.load(best.best_model_path, weights_only=True)["epoch"] == 2
 
 
-def test_a_run_that_goes_on_in_its_folder_replaces_what_it_has_kept(
-    fit: Fit, tmp_path: Path
-) -> None:
+def test_a_run_that_goes_on_in_its_folder_replaces_what_it_has_kept(fit, tmp_path) -> None:
     scores = (2.0, 1.0, 3.0)
     options = {"mode": "max", "filename": "{epoch}"}
     fit("run", 1, scores, **options)
@@ -157,7 +147,7 @@ def test_a_run_that_goes_on_in_its_folder_replaces_what_it_has_kept(
     assert weights(tmp_path / "run") == {"epoch=2.ckpt": 3}
 
 
-def test_a_run_that_was_moved_goes_on_with_its_best(fit: Fit, tmp_path: Path) -> None:
+def test_a_run_that_was_moved_goes_on_with_its_best(fit, tmp_path) -> None:
     scores = (3.0, 1.0, 2.0)
     fit("first", 1, scores, mode="max")
     (tmp_path / "first").rename(tmp_path / "moved")
@@ -165,9 +155,7 @@ def test_a_run_that_was_moved_goes_on_with_its_best(fit: Fit, tmp_path: Path) ->
     assert weights(tmp_path / "second") == {"best.ckpt": 1}
 
 
-def test_a_run_whose_best_is_gone_starts_anew_and_says_so(
-    fit: Fit, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_whose_best_is_gone_starts_anew_and_says_so(fit, tmp_path, capsys) -> None:
     scores = (3.0, 2.0, 1.0)
     gone = Path(fit("first", 1, scores, mode="max").best_model_path)
     gone.unlink()
@@ -180,7 +168,7 @@ def test_a_run_whose_best_is_gone_starts_anew_and_says_so(
 
 
 @pytest.mark.parametrize("first", [True, False])
-def test_only_the_first_process_copies(fit: Fit, tmp_path: Path, first: bool) -> None:
+def test_only_the_first_process_copies(fit, tmp_path, first) -> None:
     state = fit("first", 1, (3.0,), mode="max").state_dict()
     best = BestCheckpoint(tmp_path / "second", filename="best", monitor="score", mode="max")
     best.load_state_dict(state)
@@ -199,7 +187,7 @@ def test_only_the_first_process_copies(fit: Fit, tmp_path: Path, first: bool) ->
 
 @pytest.mark.parametrize(("epochs", "validations"), [(1, 1), (3, 1), (4, 1), (9, 2)])
 def test_a_training_too_short_for_a_validation_ends_with_one(
-    make_trainer: MakeTrainer, tmp_path: Path, epochs: int, validations: int
+    make_trainer, tmp_path, epochs, validations
 ) -> None:
     class Validated(Counter):
         validated = 0

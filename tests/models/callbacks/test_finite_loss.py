@@ -1,8 +1,6 @@
 """A training whose loss is no number stops, and the checkpoints before that stay."""
 
 import math
-from collections.abc import Callable
-from pathlib import Path
 
 import lightning
 import pytest
@@ -33,13 +31,7 @@ class Failing(lightning.LightningModule):
 @pytest.mark.parametrize(
     ("every", "stops_at"), [(1, 5), (3, 6), (100, 8)], ids=["each step", "some steps", "epochs"]
 )
-def test_it_stops_when_it_looks_next(
-    make_trainer: Callable[..., lightning.Trainer],
-    tmp_path: Path,
-    loss: float,
-    every: int,
-    stops_at: int,
-) -> None:
+def test_it_stops_when_it_looks_next(make_trainer, tmp_path, loss, every, stops_at) -> None:
     last = ModelCheckpoint(tmp_path, filename="last")
     trainer = make_trainer(
         9, callbacks=[FiniteLoss(), last], enable_checkpointing=True, log_every_n_steps=every

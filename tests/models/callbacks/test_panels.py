@@ -25,7 +25,6 @@ from derain.models.callbacks.panels import CHARTS, Dashboard, DrawnEpochs, Error
 from derain.models.outdet import OutDet
 from derain.scan import Scan
 
-MakeTrainer = Callable[..., lightning.Trainer]
 SNOW = 110
 RAINY = (1, 2, 4, 5)  # of six scans
 EPOCHS = 2
@@ -59,7 +58,7 @@ def drawn_of(
     ids=str,
 )
 def test_the_epochs_that_are_drawn_are_spread_over_the_training(
-    make_trainer: MakeTrainer, epochs: int, every: int | None, pictures: int, drawn: list[int]
+    make_trainer, epochs, every, pictures, drawn
 ) -> None:
     trainer = make_trainer(epochs)
     trainer.check_val_every_n_epoch = every
@@ -67,11 +66,11 @@ def test_the_epochs_that_are_drawn_are_spread_over_the_training(
     assert drawn_of(trainer, DrawnEpochs(pictures), last, every or 1) == drawn
 
 
-def test_of_several_validations_in_an_epoch_one_is_drawn(make_trainer: MakeTrainer) -> None:
+def test_of_several_validations_in_an_epoch_one_is_drawn(make_trainer) -> None:
     assert drawn_of(make_trainer(3), DrawnEpochs(10), 3, 1, validations=50) == [0, 1, 2]
 
 
-def test_a_test_is_drawn_and_a_sanity_check_is_not(make_trainer: MakeTrainer) -> None:
+def test_a_test_is_drawn_and_a_sanity_check_is_not(make_trainer) -> None:
     trainer = make_trainer(3)
     trainer.state.fn = TrainerFn.TESTING
     assert DrawnEpochs(1).begins(trainer)
@@ -81,7 +80,7 @@ def test_a_test_is_drawn_and_a_sanity_check_is_not(make_trainer: MakeTrainer) ->
 
 
 @pytest.fixture
-def rainy(tmp_path: Path) -> Folder:
+def rainy(tmp_path) -> Folder:
     for number in range(6):
         scene(60 + number, seed=number).tofile(tmp_path / f"{number}.bin")
         drops = np.arange(60 + number) >= 40
@@ -94,7 +93,7 @@ Drawn = tuple[Scan, NDArray[np.bool_], NDArray[np.bool_], str]
 
 
 @pytest.fixture
-def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Drawn]:
+def drawn(monkeypatch) -> list[Drawn]:
     """What figures are made of, in their place an empty one that is drawn in no time."""
     calls: list[Drawn] = []
 
@@ -108,12 +107,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Drawn]:
 
 @pytest.mark.parametrize(("scans", "expected"), [(0, ()), (3, (1, 2, 4)), (9, RAINY)])
 def test_the_first_rainy_scans_are_drawn_after_every_epoch(
-    make_trainer: MakeTrainer,
-    rainy: Folder,
-    drawn: list[Drawn],
-    tmp_path: Path,
-    scans: int,
-    expected: tuple[int, ...],
+    make_trainer, rainy, drawn, tmp_path, scans, expected
 ) -> None:
     judged: list[list[NDArray[np.bool_]]] = []
 
@@ -147,9 +141,7 @@ def test_the_first_rainy_scans_are_drawn_after_every_epoch(
         assert [event.step for event in events.Images(name)] == [1, 2]  # one batch an epoch
 
 
-def test_without_tensorboard_nothing_is_drawn(
-    make_trainer: MakeTrainer, rainy: Folder, drawn: list[Drawn]
-) -> None:
+def test_without_tensorboard_nothing_is_drawn(make_trainer, rainy, drawn) -> None:
     make_trainer(1, callbacks=[ScanPanels()]).fit(OutDet(), rainy)
     assert not drawn
 
@@ -166,13 +158,13 @@ def data() -> InMemory:
 
 
 @pytest.fixture(autouse=True)
-def _drawn_in_no_time(monkeypatch: pytest.MonkeyPatch) -> None:
+def _drawn_in_no_time(monkeypatch) -> None:
     for name in ("errors_figure", "operating_points_figure"):
         monkeypatch.setattr(panels, name, lambda *_: Figure(figsize=(0.1, 0.1)))
 
 
 @pytest.fixture
-def train(make_trainer: MakeTrainer, data: InMemory, tmp_path: Path) -> Callable[..., Any]:
+def train(make_trainer, data, tmp_path) -> Callable[..., Any]:
     """Trains 3D-OutDet, and returns the trainer, the model, and what was logged."""
 
     def run(epochs: int, callback: lightning.Callback, **options: Any) -> tuple[Any, ...]:
@@ -190,7 +182,7 @@ def steps_of_images(events: EventAccumulator, name: str) -> list[int]:
     return [event.step for event in events.Images(name)]
 
 
-def test_the_numbers_are_those_of_the_counts(train: Callable[..., Any]) -> None:
+def test_the_numbers_are_those_of_the_counts(train) -> None:
     _, model, events = train(2, ErrorPanels())
     last = {
         tag: events.Scalars(tag)[-1].value
@@ -215,7 +207,7 @@ def test_the_numbers_are_those_of_the_counts(train: Callable[..., Any]) -> None:
             assert last[lost] == pytest.approx(counts.false_positive / others)
 
 
-def test_the_curve_goes_through_the_counts_at_the_threshold(train: Callable[..., Any]) -> None:
+def test_the_curve_goes_through_the_counts_at_the_threshold(train) -> None:
     _, model, events = train(1, ErrorPanels())
     points = model.threshold_counts.points()
     assert points.counts(points.at(model.spec.threshold)) == model.metrics.counts().pooled()
@@ -233,20 +225,18 @@ def test_the_curve_goes_through_the_counts_at_the_threshold(train: Callable[...,
     assert score.value == pytest.approx(points.average_precision)
 
 
-def test_a_training_that_ends_early_is_drawn_as_it_ends(train: Callable[..., Any]) -> None:
+def test_a_training_that_ends_early_is_drawn_as_it_ends(train) -> None:
     _, _, events = train(50, ErrorPanels(2), max_steps=4)
     assert steps_of_images(events, f"validation: {TABLE}") == [1, 4]
 
 
-def test_no_pictures_leave_the_numbers(train: Callable[..., Any]) -> None:
+def test_no_pictures_leave_the_numbers(train) -> None:
     _, _, events = train(1, ErrorPanels(0))
     assert not events.Tags()["images"]
     assert "errors_by_class/falling-snow" in events.Tags()["scalars"]
 
 
-def test_scans_without_labels_have_no_errors(
-    make_trainer: MakeTrainer, data: InMemory, tmp_path: Path
-) -> None:
+def test_scans_without_labels_have_no_errors(make_trainer, data, tmp_path) -> None:
     log = TensorBoardLogger(tmp_path, "", "log")
     trainer = make_trainer(1, callbacks=[ErrorPanels()], logger=log, num_sanity_val_steps=0)
     model = OutDet()
@@ -257,7 +247,7 @@ def test_scans_without_labels_have_no_errors(
     assert len(list(tmp_path.rglob("*"))) == written
 
 
-def test_the_layout_names_what_is_logged(train: Callable[..., Any]) -> None:
+def test_the_layout_names_what_is_logged(train) -> None:
     _, _, events = train(1, Dashboard())
     (layout,) = events.Tensors("custom_scalars__config__")
     content = layout.tensor_proto.string_val[0]

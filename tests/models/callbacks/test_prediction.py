@@ -1,8 +1,6 @@
 """Predictions are written as they come, and nothing of them is kept."""
 
 import weakref
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import lightning
@@ -13,13 +11,10 @@ from derain.datamodules.folder import Folder
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.models.callbacks.prediction import PredictionWriter
-from derain.models.outdet import OutDet
-
-MakeTrainer = Callable[..., lightning.Trainer]
 
 
 @pytest.fixture
-def data(tmp_path: Path) -> Folder:
+def data(tmp_path) -> Folder:
     for name in ("a/0.bin", "a/1.bin", "a/2.bin", "b/0.bin"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         scene(50, seed=sum(name.encode())).tofile(tmp_path / name)
@@ -38,13 +33,7 @@ class Alive(lightning.Callback):
         self.seen += map(weakref.ref, outputs)
 
 
-def test_what_is_written_is_not_kept(
-    make_trainer: MakeTrainer,
-    data: Folder,
-    outdet: Callable[..., OutDet],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_what_is_written_is_not_kept(make_trainer, data, outdet, tmp_path, capsys) -> None:
     model, alive, out = outdet(), Alive(), tmp_path / "labels"
     returned = make_trainer(1, callbacks=[alive, PredictionWriter(str(out))]).predict(model, data)
     assert returned is None
@@ -60,11 +49,7 @@ def test_what_is_written_is_not_kept(
 
 @pytest.mark.parametrize("place", ["beside", "in the folder of labels"])
 def test_labels_are_not_overwritten_by_what_is_found(
-    make_trainer: MakeTrainer,
-    data: Folder,
-    outdet: Callable[..., OutDet],
-    tmp_path: Path,
-    place: str,
+    make_trainer, data, outdet, tmp_path, place
 ) -> None:
     label, out = {
         "beside": (tmp_path / "a/2.label", tmp_path),
@@ -84,11 +69,7 @@ def test_labels_are_not_overwritten_by_what_is_found(
 
 
 def test_without_labels_predictions_may_lie_beside_the_scans(
-    make_trainer: MakeTrainer,
-    data: Folder,
-    outdet: Callable[..., OutDet],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    make_trainer, data, outdet, tmp_path, capsys
 ) -> None:
     data.patterns["predict"] = ["*/*.bin", "a/0.bin"]  # a scan that is found twice is one scan
     out = tmp_path / "\N{RIGHT-TO-LEFT OVERRIDE}" / ".."

@@ -1,11 +1,9 @@
 """The report of a test names the file that it is written to, whatever its folder is called."""
 
 import json
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 
 from derain.cards.card import load_card
 from derain.evaluation.hard_cases import scene
@@ -27,9 +25,7 @@ def test_a_score_that_is_undefined_is_a_dash_in_text_and_null_in_json() -> None:
     assert set(report["ranges"]["10-20 m"].values()) == {None}
 
 
-def test_the_folder_is_printed_with_escapes(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_folder_is_printed_with_escapes(tmp_path, capsys) -> None:
     card, folder = load_card("wads"), tmp_path / "run\n\N{RIGHT-TO-LEFT OVERRIDE}"
     folder.mkdir()
     metrics = RainMetrics(card.classes, card.rain)

@@ -38,7 +38,7 @@ class Training:
 
 
 @pytest.fixture
-def training(monkeypatch: pytest.MonkeyPatch) -> Training:
+def training(monkeypatch) -> Training:
     made = Training(every=2)
     monkeypatch.setattr(time, "perf_counter", lambda: made.now)
     made.times.on_train_start()
@@ -53,7 +53,7 @@ def spent(read: float, view: float, wait: float, network: float, speed: float) -
     return pytest.approx({**values, "speed/scans_per_second": PROCESSES * speed})
 
 
-def test_means_are_logged_as_often_as_the_trainer_logs(training: Training) -> None:
+def test_means_are_logged_as_often_as_the_trainer_logs(training) -> None:
     training.step(50, 60)  # the first one starts the workers
     training.step(0.1, 0.4, scans=2, read=30, view=50)
     assert not training.logged
@@ -66,7 +66,7 @@ def test_means_are_logged_as_often_as_the_trainer_logs(training: Training) -> No
     ]
 
 
-def test_neither_validation_nor_what_lies_between_epochs_is_waited_for(training: Training) -> None:
+def test_neither_validation_nor_what_lies_between_epochs_is_waited_for(training) -> None:
     training.step(0, 1)
     training.times.on_validation_start()
     training.now += 1000
@@ -77,7 +77,7 @@ def test_neither_validation_nor_what_lies_between_epochs_is_waited_for(training:
     assert training.logged == [(3, spent(read=0, view=0, wait=500, network=1000, speed=2 / 3))]
 
 
-def test_a_training_that_logs_no_steps_says_it_at_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_training_that_logs_no_steps_says_it_at_its_end(monkeypatch) -> None:
     training = Training(every=0)
     monkeypatch.setattr(time, "perf_counter", lambda: training.now)
     training.times.on_train_start()
@@ -90,7 +90,7 @@ def test_a_training_that_logs_no_steps_says_it_at_its_end(monkeypatch: pytest.Mo
 
 
 def test_a_graphics_card_is_waited_for_at_one_step_of_those_that_are_logged(
-    training: Training, monkeypatch: pytest.MonkeyPatch
+    training, monkeypatch
 ) -> None:
     waits = []
 

@@ -20,7 +20,7 @@ from derain.datamodules.folder import Folder
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
-from derain.learning.batch import Batch, Sample
+from derain.learning.batch import Batch
 from derain.models.lisnownet import LiSnowNet
 from derain.models.lisnownet.network import LiSnowNetwork, published_key
 from derain.models.lisnownet.selection_rule import FEWEST, SelectionRule, cube_roots, rain_logits
@@ -32,9 +32,6 @@ from derain.views.probability import probability_of_rain
 from derain.views.range_image import RangeImage
 from derain.views.spherical_grid import grid_of
 
-MakeModel = Callable[..., LiSnowNet]
-MakeSample = Callable[..., Sample]
-MakeTrainer = Callable[..., lightning.Trainer]
 WADS = load_card("wads")
 PUBLISHED = SelectionRule(residual=0.008, ground=-1.8, intensity=2 / 255, near=2.5)
 
@@ -70,9 +67,7 @@ def test_the_spec_says_how_the_network_is_used() -> None:
         (27.0, 65_535.0, 65_535.0, (3.0, 1.0)),
     ],
 )
-def test_the_network_sees_cube_roots(
-    distance: float, intensity: float, full_scale: float, seen: tuple[float, float]
-) -> None:
+def test_the_network_sees_cube_roots(distance, intensity, full_scale, seen) -> None:
     image = torch.tensor([distance, -1.0, intensity])[None, :, None, None]
     roots = cube_roots(image, SelectionRule(full_scale=full_scale))
     np.testing.assert_allclose(roots.flatten(), seen, rtol=1e-6)
@@ -95,7 +90,7 @@ def says_snow(
     [PUBLISHED, SelectionRule(), SelectionRule(0.012, -0.5, 0.3, 1.0, 1.0)],
     ids=["published", "default", "share"],
 )
-def test_a_probability_above_one_half_is_what_the_published_rule_says(rule: SelectionRule) -> None:
+def test_a_probability_above_one_half_is_what_the_published_rule_says(rule) -> None:
     rng = np.random.default_rng(0)
     size = (40, 50)
     intensity = rng.choice([0.0, 1.0, 2.0, 3.0, 200.0], size) / 255 * rule.full_scale
@@ -128,7 +123,7 @@ def test_the_probability_rises_with_the_residual() -> None:
 
 @torch.no_grad()
 def test_the_model_applies_its_rule_to_what_the_network_changed(
-    image_network: MakeModel, image_sample: MakeSample
+    image_network, image_sample
 ) -> None:
     model = image_network(LiSnowNet, rule={"residual": 1.0, "near": 6.0})
     one = image_sample(model, scene())
@@ -153,7 +148,7 @@ def test_the_residual_is_l1_unless_another_norm_is_named() -> None:
 @torch.no_grad()
 @pytest.mark.parametrize(("alpha", "beta", "norm"), [(5.5, 0.5, "l1"), (3.0, 0.2, "l2")])
 def test_the_losses_are_those_of_what_the_network_saw(
-    image_network: MakeModel, image_sample: MakeSample, alpha: float, beta: float, norm: str
+    image_network, image_sample, alpha, beta, norm
 ) -> None:
     model = image_network(LiSnowNet, alpha=alpha, beta=beta, norm=norm)
     batch = Batch.of([image_sample(model, scene(3000, seed)) for seed in range(2)])
@@ -170,9 +165,7 @@ def test_the_losses_are_those_of_what_the_network_saw(
 
 @pytest.mark.parametrize("prefix", ["", "module."])
 @torch.no_grad()
-def test_published_weights_are_taken_over(
-    image_network: MakeModel, image_sample: MakeSample, prefix: str
-) -> None:
+def test_published_weights_are_taken_over(image_network, image_sample, prefix) -> None:
     own = image_network(LiSnowNet)
     weights = {prefix + key: tensor for key, tensor in published(own.network).items()}
     model = LiSnowNet.from_published(weights, WADS, "wads").eval()
@@ -185,7 +178,7 @@ def test_published_weights_are_taken_over(
     assert model.selection == SelectionRule()
 
 
-def test_weights_need_a_grid_and_a_network_that_fits(image_network: MakeModel) -> None:
+def test_weights_need_a_grid_and_a_network_that_fits(image_network) -> None:
     weights = published(image_network(LiSnowNet).network)
     with pytest.raises(InputError, match=r"the grid .*Give --grid\."):
         LiSnowNet.from_published(weights, WADS)
@@ -243,7 +236,7 @@ def scenes_of(folder: Path, card: str = "wads") -> Folder:
 
 
 @pytest.fixture(scope="module")
-def train(make_trainer: MakeTrainer, small_grid: dict[str, Any]) -> Callable[..., Run]:
+def train(make_trainer, small_grid) -> Callable[..., Run]:
     """Trains on the scenes in a folder, from the same seed unless it is given another."""
 
     def fit(folder: Path, rule: dict[str, float] = LENIENT, seed: int = 0) -> Run:
@@ -259,13 +252,13 @@ def train(make_trainer: MakeTrainer, small_grid: dict[str, Any]) -> Callable[...
 
 
 @pytest.fixture(scope="module")
-def labelled(train: Callable[..., Run], tmp_path_factory: pytest.TempPathFactory) -> Run:
+def labelled(train, tmp_path_factory) -> Run:
     """A training on scenes that have their labels; the rule's residual is stated."""
     return train(write_four(tmp_path_factory.mktemp("labelled")))
 
 
 def test_training_labels_are_not_opened_and_garbage_in_them_changes_nothing(
-    train: Callable[..., Run], labelled: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    train, labelled, tmp_path, monkeypatch
 ) -> None:
     write_four(tmp_path)
     (tmp_path / "0.label").write_bytes(b"garbage")
@@ -285,9 +278,7 @@ def test_training_labels_are_not_opened_and_garbage_in_them_changes_nothing(
     assert labelled.model.spec == run.model.spec
 
 
-def test_validation_labels_measure_and_choose_nothing(
-    train: Callable[..., Run], labelled: Run, tmp_path: Path
-) -> None:
+def test_validation_labels_measure_and_choose_nothing(train, labelled, tmp_path) -> None:
     swap_validation_labels(write_four(tmp_path))
     run = train(tmp_path)
     assert labelled.progress.iou != run.progress.iou
@@ -299,11 +290,11 @@ def test_validation_labels_measure_and_choose_nothing(
     assert_same(labelled.best["state_dict"], run.best["state_dict"])
 
 
-def test_a_stated_residual_is_not_fitted(labelled: Run) -> None:
+def test_a_stated_residual_is_not_fitted(labelled) -> None:
     assert labelled.model.selection.residual == LENIENT["residual"]
 
 
-def test_the_learning_rate_falls_after_every_epoch(labelled: Run) -> None:
+def test_the_learning_rate_falls_after_every_epoch(labelled) -> None:
     (optimizer,) = labelled.model.trainer.optimizers
     assert isinstance(optimizer, torch.optim.Adam)
     assert [group["lr"] for group in optimizer.param_groups] == [pytest.approx(0.05 * 0.5**4)]
@@ -325,7 +316,7 @@ class Fitted(NamedTuple):
 
 
 @pytest.fixture(scope="module")
-def fitted(train: Callable[..., Run], tmp_path_factory: pytest.TempPathFactory) -> Fitted:
+def fitted(train, tmp_path_factory) -> Fitted:
     folder = write_four(tmp_path_factory.mktemp("fitted"), validated=3000)
     return Fitted(folder, train(folder, UNSTATED, SEED))
 
@@ -340,7 +331,7 @@ def best_of(fitted: Fitted) -> tuple[LiSnowNet, RangeImage]:
 
 @torch.no_grad()
 def test_the_residual_is_fitted_to_what_the_network_changes_in_the_validation_scans(
-    train: Callable[..., Run], fitted: Fitted, tmp_path: Path
+    train, fitted, tmp_path
 ) -> None:
     best, view = best_of(fitted)
     image, valid = (torch.from_numpy(array) for array in view.inputs().values())
@@ -358,7 +349,7 @@ def test_the_residual_is_fitted_to_what_the_network_changes_in_the_validation_sc
 
 
 @torch.no_grad()
-def test_the_scores_of_an_epoch_are_those_of_its_checkpoint(fitted: Fitted) -> None:
+def test_the_scores_of_an_epoch_are_those_of_its_checkpoint(fitted) -> None:
     best, view = best_of(fitted)
     logits = best(**{name: torch.from_numpy(array) for name, array in view.inputs().items()})
     found = view.back(probability_of_rain(logits.numpy())) > best.spec.threshold
@@ -369,9 +360,7 @@ def test_the_scores_of_an_epoch_are_those_of_its_checkpoint(fitted: Fitted) -> N
     assert run.progress.iou[run.best["epoch"]] == pytest.approx(iou)
 
 
-def test_measuring_a_model_leaves_its_rule_as_it_is(
-    fitted: Fitted, make_trainer: MakeTrainer, tmp_path: Path
-) -> None:
+def test_measuring_a_model_leaves_its_rule_as_it_is(fitted, make_trainer, tmp_path) -> None:
     model, spec = fitted.run.model, fitted.run.model.spec
     scene(300, seed=9).tofile(tmp_path / "9.bin")
     data = Folder(str(tmp_path), "wads", validation=["9.bin"])
@@ -380,7 +369,7 @@ def test_measuring_a_model_leaves_its_rule_as_it_is(
 
 
 def test_a_training_fits_the_rule_to_its_own_validation_scans(
-    make_trainer: MakeTrainer, small_grid: dict[str, Any], tmp_path: Path
+    make_trainer, small_grid, tmp_path
 ) -> None:
     model, seen = LiSnowNet(small_grid, width=2), list[str]()
     look = model._image_of

@@ -1,7 +1,5 @@
 """The selection rule is fitted to scans alone, and is the published one where nothing is known."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -58,7 +56,7 @@ WHOLE = SelectionRule().as_dict()
         ({}, "rule: residual is missing"),
     ],
 )
-def test_a_rule_that_a_spec_cannot_mean_is_refused(content: dict[str, float], reason: str) -> None:
+def test_a_rule_that_a_spec_cannot_mean_is_refused(content, reason) -> None:
     with pytest.raises(InputError, match=rf"^model: {reason}"):
         SelectionRule.of(Entry("model", "rule", content))
 
@@ -75,9 +73,7 @@ def test_a_rule_that_a_spec_cannot_mean_is_refused(content: dict[str, float], re
         ([[]], 255.0),
     ],
 )
-def test_the_full_scale_is_the_smallest_that_no_intensity_exceeds(
-    intensities: list[list[float]], full_scale: float
-) -> None:
+def test_the_full_scale_is_the_smallest_that_no_intensity_exceeds(intensities, full_scale) -> None:
     scans = [bright(*values) for values in intensities]
     assert SelectionRule.fitted({}, scans).full_scale == full_scale
 
@@ -100,9 +96,7 @@ def test_what_is_not_measured_says_nothing_of_the_full_scale() -> None:
         (((1, -2), (30, -2)), -1.8),  # no road in sight: as published
     ],
 )
-def test_the_ground_is_a_little_above_the_road(
-    rings: tuple[tuple[float, float], ...], ground: float
-) -> None:
+def test_the_ground_is_a_little_above_the_road(rings, ground) -> None:
     assert SelectionRule.fitted({}, [on_rings(*rings)]).ground == pytest.approx(ground)
 
 
@@ -136,9 +130,7 @@ def two_groups(low: float, high: float, share: float = 0.1) -> NDArray[np.float3
 
 @pytest.mark.parametrize(("low", "high"), [(1e-4, 1.0), (1e-7, 1.0), (3e-2, 300.0)])
 @pytest.mark.parametrize("share", [0.02, 0.5])
-def test_the_residual_parts_what_changed_from_what_did_not(
-    low: float, high: float, share: float
-) -> None:
+def test_the_residual_parts_what_changed_from_what_did_not(low, high, share) -> None:
     rule = SelectionRule(near=2.5).with_residual_of(two_groups(low, high, share))
     assert 9.9 * low < rule.residual < high / 9.9
     assert rule == SelectionRule(residual=rule.residual, near=2.5)
@@ -149,7 +141,7 @@ def test_the_residual_parts_what_changed_from_what_did_not(
     [np.zeros(0), np.zeros(500), np.full(500, -1.0), np.geomspace(1e-6, 1, 99)],
     ids=["none", "zeros", "negative", "few"],
 )
-def test_too_few_changes_leave_the_residual_as_it_is(products: NDArray[np.float64]) -> None:
+def test_too_few_changes_leave_the_residual_as_it_is(products) -> None:
     rule = SelectionRule(residual=0.05)
     assert rule.with_residual_of(products.astype(np.float32)) == rule
 
@@ -159,7 +151,7 @@ def test_a_residual_is_not_fitted_to_noise() -> None:
 
 
 @pytest.mark.parametrize("value", [1e-30, 0.05, 1e30])
-def test_a_residual_is_fitted_to_changes_that_are_all_the_same(value: float) -> None:
+def test_a_residual_is_fitted_to_changes_that_are_all_the_same(value) -> None:
     rule = SelectionRule().with_residual_of(np.full(500, value, np.float32))
     assert np.isfinite(rule.residual)
     assert rule.residual >= 0.001
@@ -174,13 +166,13 @@ def test_an_unknown_constant_is_refused_with_the_known_ones() -> None:
 
 
 @pytest.mark.parametrize("scan", HARD_CASES.values(), ids=HARD_CASES)
-def test_every_hard_scan_gives_a_rule(scan: Scan) -> None:
+def test_every_hard_scan_gives_a_rule(scan) -> None:
     rule = SelectionRule.fitted({}, [scan])
     assert np.isfinite(list(rule.as_dict().values())).all()
     assert rule.full_scale in (1.0, 255.0, 65_535.0)
 
 
-def test_the_rule_that_is_fitted_to_wads_is_the_published_one(shared: Path) -> None:
+def test_the_rule_that_is_fitted_to_wads_is_the_published_one(shared) -> None:
     paths = sorted((shared / "data/wads/sequences/36").glob("*/*.bin"))
     rule = SelectionRule.fitted({"residual": 0.008}, [read_scan(path) for path in paths])
     assert rule.full_scale == 255
@@ -188,7 +180,7 @@ def test_the_rule_that_is_fitted_to_wads_is_the_published_one(shared: Path) -> N
 
 
 @given(st.integers(0, 2**32))
-def test_otsu_leaves_the_least_variance_within_two_groups(seed: int) -> None:
+def test_otsu_leaves_the_least_variance_within_two_groups(seed) -> None:
     rng = np.random.default_rng(seed)
     values = np.concatenate([rng.normal(0, 1, 60), rng.normal(rng.uniform(0, 8), 1, 40)])
 

@@ -2,7 +2,6 @@
 
 import math
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -33,7 +32,7 @@ def all_valid(image: Tensor) -> Tensor:
     return torch.ones_like(image[:, :1], dtype=torch.bool)
 
 
-def test_each_part_is_the_published_one(shared: Path) -> None:
+def test_each_part_is_the_published_one(shared) -> None:
     oracle = np.load(shared / "oracles" / "lisnownet.npz")
     image, denoised = torch.from_numpy(oracle["x"]), torch.from_numpy(oracle["y"])
     valid = (image >= 0).any(dim=1, keepdim=True)
@@ -45,7 +44,7 @@ def test_each_part_is_the_published_one(shared: Path) -> None:
 
 @pytest.mark.parametrize(("alpha", "weight"), [(0, 0), (1, 0.5), (5, 0.96875), (5.5, 0.9779029)])
 @pytest.mark.parametrize("beta", [0, 0.3, 1])
-def test_alpha_and_beta_weigh_the_parts(alpha: float, weight: float, beta: float) -> None:
+def test_alpha_and_beta_weigh_the_parts(alpha, weight, beta) -> None:
     denoised, image = noise(2, 2, 16, 32), noise(2, 2, 16, 32, seed=1)
     loss = sparsity_loss(denoised, image, all_valid(image), alpha, beta)
     sparsity = beta * loss.wavelet + (1 - beta) * loss.fourier
@@ -55,7 +54,7 @@ def test_alpha_and_beta_weigh_the_parts(alpha: float, weight: float, beta: float
 
 @pytest.mark.parametrize("width", [1, 2, 7, 8])
 @pytest.mark.parametrize("height", [1, 2, 5, 6])
-def test_the_checkerboard_is_folded_cell_by_cell(height: int, width: int) -> None:
+def test_the_checkerboard_is_folded_cell_by_cell(height, width) -> None:
     image = noise(2, 3, height, width)
     even = torch.cat([image, image[..., : width % 2]], dim=-1)
     expected = torch.zeros(2, 3, 2 * height, even.shape[-1] // 2, dtype=torch.float64)
@@ -68,9 +67,7 @@ def test_the_checkerboard_is_folded_cell_by_cell(height: int, width: int) -> Non
 @pytest.mark.parametrize(
     ("size", "cell", "expected"), [(8, 1, 2 / 3), (16, 1, 2 / 3), (16, 2, 1 / 6)]
 )
-def test_a_checkerboard_has_details_along_the_diagonal_of_one_level(
-    size: int, cell: int, expected: float
-) -> None:
+def test_a_checkerboard_has_details_along_the_diagonal_of_one_level(size, cell, expected) -> None:
     assert wavelet_sparsity(checkerboard(size, cell)).item() == pytest.approx(expected)
 
 
@@ -83,9 +80,7 @@ def test_a_checkerboard_has_details_along_the_diagonal_of_one_level(
         (2**40, 2**40, 38),
     ],
 )
-def test_an_image_is_halved_as_published_or_as_often_as_it_can_be(
-    height: int, width: int, levels: int
-) -> None:
+def test_an_image_is_halved_as_published_or_as_often_as_it_can_be(height, width, levels) -> None:
     assert wavelet_levels(height, width) == levels
 
 
@@ -107,7 +102,7 @@ def test_a_wave_excites_one_frequency() -> None:
 @pytest.mark.parametrize(
     ("norm", "expected"), [("l1", (0.5 + 0 + 1 + 0.5) / 4), ("l2", (0.25 + 0 + 1 + 0.25) / 4)]
 )
-def test_the_residual_counts_every_channel_of_every_valid_pixel(norm: str, expected: float) -> None:
+def test_the_residual_counts_every_channel_of_every_valid_pixel(norm, expected) -> None:
     image = torch.tensor([[[[1.0, 2.0, math.nan]], [[0.0, 0.5, -1.0]]]])
     denoised = torch.tensor([[[[1.5, 2.0, 7.0]], [[-1.0, 1.0, 9.0]]]])
     valid = torch.tensor([[[[True, True, False]]]])
@@ -135,9 +130,7 @@ def test_images_of_a_batch_count_alike_in_sparsity_and_pixels_in_the_residual() 
 @pytest.mark.parametrize("value", [None, 0.0, 2.7], ids=["noise", "zero", "constant"])
 @pytest.mark.parametrize("size", [(1, 1), (1, 2), (15, 33), (40, 60), (64, 128)])
 @pytest.mark.parametrize("norm", ["l1", "l2"])
-def test_values_and_gradients_are_finite(
-    size: tuple[int, int], value: float | None, share: float, norm: str
-) -> None:
+def test_values_and_gradients_are_finite(size, value, share, norm) -> None:
     image = noise(2, 2, *size).float() if value is None else torch.full((2, 2, *size), value)
     valid = torch.rand(2, 1, *size) < share
     denoised = image.clone().requires_grad_()

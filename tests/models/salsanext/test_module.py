@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import lightning
@@ -18,7 +17,7 @@ from derain.datamodules.base import Loading
 from derain.datamodules.folder import Folder
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
-from derain.learning.batch import Batch, Sample
+from derain.learning.batch import Batch
 from derain.learning.losses import class_weights, segmentation_loss
 from derain.models.salsanext import SalsaNext
 from derain.models.salsanext.network import PUBLISHED_KEYS, SalsaNextNetwork
@@ -26,9 +25,6 @@ from derain.views.probability import probability_of_rain
 from derain.views.spherical_grid import grid_of
 from derain.views.view import IGNORED
 
-MakeModel = Callable[..., SalsaNext]
-MakeSample = Callable[..., Sample]
-MakeTrainer = Callable[..., lightning.Trainer]
 WADS = load_card("wads")
 
 
@@ -53,7 +49,7 @@ def test_the_spec_says_how_the_network_is_used() -> None:
 @pytest.mark.parametrize("prefix", ["", "module."])
 @torch.no_grad()
 def test_published_weights_give_the_logits_of_the_network_on_normalised_images(
-    image_network: MakeModel, image_sample: MakeSample, small_grid: dict[str, Any], prefix: str
+    image_network, image_sample, small_grid, prefix
 ) -> None:
     network = image_network(SalsaNext).network
     weights = {prefix + key: tensor for key, tensor in published(network).items()}
@@ -69,7 +65,7 @@ def test_published_weights_give_the_logits_of_the_network_on_normalised_images(
     torch.testing.assert_close(model(**inputs), expected, rtol=1e-4, atol=1e-4)
 
 
-def test_weights_need_a_grid_and_a_card_with_statistics_of_range(image_network: MakeModel) -> None:
+def test_weights_need_a_grid_and_a_card_with_statistics_of_range(image_network) -> None:
     weights = published(image_network(SalsaNext).network)
     with pytest.raises(InputError, match=r"the grid .*Give --grid\."):
         SalsaNext.from_published(weights, WADS)
@@ -86,7 +82,7 @@ def test_weights_need_a_grid_and_a_card_with_statistics_of_range(image_network: 
         ({"channels": 4}, "2 classes and 4 channels"),
     ],
 )
-def test_weights_that_do_not_tell_rain_are_refused(size: dict[str, int], reason: str) -> None:
+def test_weights_that_do_not_tell_rain_are_refused(size, reason) -> None:
     weights = published(SalsaNextNetwork(width=4, **size))
     with pytest.raises(InputError, match=reason):
         SalsaNext.from_published(weights, WADS, "wads")
@@ -112,9 +108,7 @@ def as_numbers(logits: Tensor) -> NDArray[np.float64]:
     return np.stack([1 - rain, rain], axis=1)
 
 
-def test_the_published_loss_trains_empty_pixels_and_knows_no_false_alarm(
-    pixels: tuple[Tensor, Tensor],
-) -> None:
+def test_the_published_loss_trains_empty_pixels_and_knows_no_false_alarm(pixels) -> None:
     logits, target = pixels
     loss = losing(published_loss=True).segmentation_loss(logits, target)
     probability, rain = as_numbers(logits), target.numpy() == 1
@@ -126,7 +120,7 @@ def test_the_published_loss_trains_empty_pixels_and_knows_no_false_alarm(
     assert loss.total.item() == pytest.approx((loss.cross_entropy + loss.lovasz).item())
 
 
-def test_the_corrected_loss_leaves_empty_pixels_out(pixels: tuple[Tensor, Tensor]) -> None:
+def test_the_corrected_loss_leaves_empty_pixels_out(pixels) -> None:
     logits, target = pixels
     model, empty = losing(published_loss=False), target == IGNORED
     loss = model.segmentation_loss(logits, target)
@@ -142,9 +136,7 @@ def test_the_corrected_loss_leaves_empty_pixels_out(pixels: tuple[Tensor, Tensor
     )
 
 
-def test_false_alarms_cost_in_the_corrected_lovasz_loss_alone(
-    pixels: tuple[Tensor, Tensor],
-) -> None:
+def test_false_alarms_cost_in_the_corrected_lovasz_loss_alone(pixels) -> None:
     _, target = pixels
     everything_rain = torch.tensor([[-50.0, 50.0]]).repeat(len(target), 1)
     share = (target == 1).sum() / (target != IGNORED).sum()
@@ -157,7 +149,7 @@ def test_false_alarms_cost_in_the_corrected_lovasz_loss_alone(
 
 @pytest.mark.parametrize("published_loss", [False, True])
 @pytest.mark.parametrize("of", [IGNORED, 0, 1], ids=["empty", "no rain", "nothing but rain"])
-def test_both_losses_are_defined_for_one_kind_of_pixel(of: int, published_loss: bool) -> None:
+def test_both_losses_are_defined_for_one_kind_of_pixel(of, published_loss) -> None:
     logits = torch.randn(40, 2, generator=torch.Generator().manual_seed(0), requires_grad=True)
     loss = losing(published_loss).segmentation_loss(logits, torch.full((40,), of)).total
     loss.backward()
@@ -167,7 +159,7 @@ def test_both_losses_are_defined_for_one_kind_of_pixel(of: int, published_loss: 
 
 
 @pytest.fixture
-def scenes(tmp_path: Path) -> Callable[..., Folder]:
+def scenes(tmp_path) -> Callable[..., Folder]:
     """Makes a data module of four small labelled scenes."""
     write_scenes(tmp_path, *4 * [300], name="{}.bin", rain=110)
 
@@ -193,12 +185,7 @@ class LearningRates(lightning.Callback):
 @pytest.mark.parametrize("warm_up", [1, 2])
 @pytest.mark.parametrize(("batches_a_step", "steps"), [(1, 3), (2, 2), (3, 1)])
 def test_the_optimiser_and_its_learning_rate_at_every_step_are_as_published(
-    make_trainer: MakeTrainer,
-    scenes: Callable[..., Folder],
-    small_grid: dict[str, Any],
-    warm_up: int,
-    batches_a_step: int,
-    steps: int,
+    make_trainer, scenes, small_grid, warm_up, batches_a_step, steps
 ) -> None:
     rates, decay = LearningRates(), 0.5
     accumulating = {"accumulate_grad_batches": batches_a_step, "limit_val_batches": 0}
@@ -216,9 +203,7 @@ def test_the_optimiser_and_its_learning_rate_at_every_step_are_as_published(
     assert rates.values == pytest.approx([*rising, *falling])
 
 
-def test_the_model_learns_grid_spec_and_class_weights_from_its_data(
-    make_trainer: MakeTrainer, scenes: Callable[..., Folder]
-) -> None:
+def test_the_model_learns_grid_spec_and_class_weights_from_its_data(make_trainer, scenes) -> None:
     model, data = SalsaNext(width=4), scenes(batch_size=3)
     trainer = make_trainer(epochs=1, limit_val_batches=1)
     trainer.fit(model, data)

@@ -2,7 +2,6 @@
 
 import json
 from collections import Counter
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -36,7 +35,7 @@ def image(height: int, width: int, channels: int = 5, scans: int = 1) -> Tensor:
 
 
 @torch.no_grad()
-def test_the_probabilities_are_those_of_the_published_network(shared: Path) -> None:
+def test_the_probabilities_are_those_of_the_published_network(shared) -> None:
     oracle = np.load(shared / "oracles" / "salsanext.npz")
     shapes = json.loads((shared / "oracles" / "shapes.json").read_text())["salsanext"]
     assert sorted(PUBLISHED_KEYS.values()) == list(oracle["keys"])
@@ -46,7 +45,7 @@ def test_the_probabilities_are_those_of_the_published_network(shared: Path) -> N
 
 
 @pytest.mark.parametrize(("classes", "expected"), [(2, 6_710_978), (20, 6_711_572)])
-def test_it_has_the_published_number_of_parameters(classes: int, expected: int) -> None:
+def test_it_has_the_published_number_of_parameters(classes, expected) -> None:
     network = SalsaNextNetwork(classes=classes)
     assert sum(parameter.numel() for parameter in network.parameters()) == expected
     assert sum(buffer.numel() for buffer in network.buffers()) == 10_922
@@ -56,7 +55,7 @@ def test_it_has_the_published_number_of_parameters(classes: int, expected: int) 
     ("channels", "width", "classes"), [(5, 8, 2), (2, 16, 2), (7, 2, 20), (1, 6, 1)]
 )
 @torch.no_grad()
-def test_its_size_is_read_from_published_weights(channels: int, width: int, classes: int) -> None:
+def test_its_size_is_read_from_published_weights(channels, width, classes) -> None:
     network = small(channels, width, classes)
     read = SalsaNextNetwork.from_published(published(network)).eval()
     assert (read.channels, read.width, read.classes) == (channels, width, classes)
@@ -77,9 +76,7 @@ def test_its_size_is_read_from_published_weights(channels: int, width: int, clas
         ({"logits.bias": torch.zeros(3)}, "head.weight"),
     ],
 )
-def test_weights_of_another_network_are_refused(
-    change: dict[str, Tensor | None], reason: str
-) -> None:
+def test_weights_of_another_network_are_refused(change, reason) -> None:
     tensors = {**published(small()), **change}
     state_dict = {key: tensor for key, tensor in tensors.items() if tensor is not None}
     with pytest.raises(InputError, match=reason):
@@ -87,7 +84,7 @@ def test_weights_of_another_network_are_refused(
 
 
 @pytest.mark.parametrize("width", [-2, 0, 1, 31])
-def test_a_width_that_cannot_be_halved_is_refused(width: int) -> None:
+def test_a_width_that_cannot_be_halved_is_refused(width) -> None:
     with pytest.raises(InputError, match=f"width: {width} is not"):
         SalsaNextNetwork(width=width)
 
@@ -127,9 +124,7 @@ def step(network: nn.Module, batch: Tensor) -> None:
 @both
 @pytest.mark.parametrize(("height", "width"), [(1, 1), (2, 17), (15, 16), (20, 37), (32, 48)])
 @torch.no_grad()
-def test_an_image_of_any_size_counts_as_continued_by_empty_pixels(
-    kind: type[SalsaNextPlan], height: int, width: int
-) -> None:
+def test_an_image_of_any_size_counts_as_continued_by_empty_pixels(kind, height, width) -> None:
     network, seen = random_one(kind), image(height, width)
     padded = torch.zeros(1, 5, -(-height // 16) * 16, -(-width // 16) * 16)
     padded[..., :height, :width] = seen
@@ -142,14 +137,12 @@ def test_an_image_of_any_size_counts_as_continued_by_empty_pixels(
 @pytest.mark.parametrize(
     ("scans", "height", "width"), [(1, 1, 1), (1, 16, 16), (2, 16, 16), (1, 20, 37)]
 )
-def test_a_training_step_on_small_images_is_finite(
-    kind: type[SalsaNextPlan], scans: int, height: int, width: int
-) -> None:
+def test_a_training_step_on_small_images_is_finite(kind, scans, height, width) -> None:
     step(random_one(kind), image(height, width, scans=scans))
 
 
 @both
-def test_the_gradient_reaches_every_parameter(kind: type[SalsaNextPlan]) -> None:
+def test_the_gradient_reaches_every_parameter(kind) -> None:
     network = random_one(kind, width=8)
     # At the bottleneck 3×3 pixels: in fewer, some taps of its kernels only ever see the padding.
     step(network, image(48, 48, scans=2))
@@ -161,9 +154,7 @@ def test_the_gradient_reaches_every_parameter(kind: type[SalsaNextPlan]) -> None
     # On the way down; on the way up before and after the layers, and, in SalsaNext, the joint.
     [(SalsaNextNetwork, 4), (SalsaNextLiteNetwork, 3)],
 )
-def test_features_are_dropped_everywhere_but_at_full_resolution(
-    kind: type[SalsaNextPlan], drops: int
-) -> None:
+def test_features_are_dropped_everywhere_but_at_full_resolution(kind, drops) -> None:
     network = kind(width=4, dropout=0.3).train()
     dropped: list[tuple[int, float]] = []
 

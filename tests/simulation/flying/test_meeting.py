@@ -76,7 +76,7 @@ def test_clear_air_is_the_clear_air_of_rain_without_rain() -> None:
 
 
 @pytest.mark.parametrize("spill", [1.0, 2.0])
-def test_both_returns_come_where_any_particle_is_before_a_dim_surface(spill: float) -> None:
+def test_both_returns_come_where_any_particle_is_before_a_dim_surface(spill) -> None:
     """Particles outshine the surface, which is the last: both unless the beam meets none."""
     snow = Precipitation(number=1500.0 / spill**2, spill=spill, reflectivity=1.0)
     beams, optics, sizes = SPARSE.beams(), Optics.of(snow, SPARSE), Sizes.gamma(1, 1, snow.largest)
@@ -107,7 +107,7 @@ def test_both_returns_come_where_any_particle_is_before_a_dim_surface(spill: flo
     returns=st.sampled_from(["strongest", "last", "dual"]),
 )
 def test_whatever_flies_each_beam_is_kept_weaker_or_ends_nearer_or_is_lost(
-    kind: str, seed: int, returns: str
+    kind, seed, returns
 ) -> None:
     generator = np.random.default_rng(seed)
     sensor, clear = replace(SENSOR, returns=returns), random_surfaces(len(BEAMS), generator)
@@ -151,7 +151,7 @@ def test_weak_returns_scatter_more_than_strong_ones() -> None:
 
 
 @pytest.mark.parametrize("crowding", [0.01, 1.0])
-def test_no_more_particles_than_the_crowding_meet_an_open_beam(crowding: float) -> None:
+def test_no_more_particles_than_the_crowding_meet_an_open_beam(crowding) -> None:
     snow = Precipitation(number=1e5, diameter=3.0, crowding=crowding)
     optics, sizes = Optics.of(snow, SENSOR), Sizes.gamma(3.0, 1.0, snow.largest)
     few = uncrowded(snow, optics, sizes)

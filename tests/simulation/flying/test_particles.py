@@ -17,9 +17,7 @@ NARROW = Sensor(aperture=0.005)
 
 
 @pytest.mark.parametrize(("mean", "shape", "largest"), [(1, 1, 6), (3, 4, 20), (0.3, 1, 2)])
-def test_moments_are_those_of_the_cut_gamma_distribution(
-    mean: float, shape: float, largest: float
-) -> None:
+def test_moments_are_those_of_the_cut_gamma_distribution(mean, shape, largest) -> None:
     sizes = Sizes.gamma(mean, shape, largest)
     diameter = np.linspace(SMALLEST, largest, 200_001)
     density = diameter ** (shape - 1) * np.exp(-shape * diameter / mean)
@@ -30,13 +28,13 @@ def test_moments_are_those_of_the_cut_gamma_distribution(
 
 
 @pytest.mark.parametrize("mean", [1e-3, 1e4])
-def test_a_mean_far_outside_the_cut_leaves_finite_shares(mean: float) -> None:
+def test_a_mean_far_outside_the_cut_leaves_finite_shares(mean) -> None:
     assert Sizes.gamma(mean, 5, 20).share.sum() == pytest.approx(1)
 
 
 @pytest.mark.parametrize("reach", [0.0, 5.0, 80.0])
 @pytest.mark.parametrize("spill", [1.0, 3.0])
-def test_the_smallest_visible_particle_is_at_the_threshold(reach: float, spill: float) -> None:
+def test_the_smallest_visible_particle_is_at_the_threshold(reach, spill) -> None:
     optics = Optics.of(Precipitation(reach=reach, spill=spill, diameter=2.0), NARROW)
     distance = np.array([1.0, 4.0, 15.0])
     smallest = optics.smallest_visible(distance)
@@ -96,7 +94,7 @@ def mean_tube(far: float) -> float:
     return float((SIZES.share * tube(far, SIZES.diameter)).sum())
 
 
-def test_meetings_are_those_found_by_looking_at_every_beam(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_meetings_are_those_found_by_looking_at_every_beam(monkeypatch) -> None:
     monkeypatch.setattr(particles_module, "PAIRS_AT_ONCE", 50)
     generator = np.random.default_rng(1)
     far = generator.uniform(0.3, 30, 80)
@@ -131,7 +129,7 @@ def test_distances_and_sizes_follow_the_volume_of_each() -> None:
 
 
 @pytest.mark.parametrize("shadow", [False, True])
-def test_beams_that_overlap_share_the_particles_of_the_space_that_they_fill(shadow: bool) -> None:
+def test_beams_that_overlap_share_the_particles_of_the_space_that_they_fill(shadow) -> None:
     """Places in a box around the beams are tried one by one; every third beam may end early."""
     far = np.where(np.arange(len(TOGETHER)) % 3 == 0, 12.0, 4.0 if shadow else 12.0)
     beams = open_beams(TOGETHER, far)

@@ -19,7 +19,7 @@ def read(value: object) -> PrecipitationSpans:
 
 @settings(max_examples=50)
 @given(seed=st.integers(0, 2**32), name=st.sampled_from(sorted(KINDS)))
-def test_every_number_is_within_its_span_or_switched_off(seed: int, name: str) -> None:
+def test_every_number_is_within_its_span_or_switched_off(seed, name) -> None:
     kind = KINDS[name]
     drawn = kind.draw(name, np.random.default_rng(seed))
     assert drawn.kind == name
@@ -71,7 +71,7 @@ def test_what_a_document_leaves_out_stays_as_it_is() -> None:
         ({}, "weight"),
     ],
 )
-def test_a_wrong_document_is_refused_with_its_place(value: object, named: str) -> None:
+def test_a_wrong_document_is_refused_with_its_place(value, named) -> None:
     with pytest.raises(InputError, match=rf"world\.yaml: .*{named}"):
         read(value)
 
@@ -92,7 +92,7 @@ def test_a_wrong_document_is_refused_with_its_place(value: object, named: str) -
         ("haze_strength", 0.5),
     ],
 )
-def test_precipitation_that_cannot_be_is_refused_by_name(name: str, value: object) -> None:
+def test_precipitation_that_cannot_be_is_refused_by_name(name, value) -> None:
     with pytest.raises(InputError, match=name):
         replace(Precipitation(), **{name: value})
     if not isinstance(value, str):  # a kind is drawn from what can be

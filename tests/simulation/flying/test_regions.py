@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from derain.simulation.classes import TrackClass, packed
 from derain.simulation.flying.particles import Stretch
-from derain.simulation.flying.precipitation import UNEVEN, GustForm
-from derain.simulation.flying.regions import GroundLayer, Gusts, Plume, Region, draw_plumes
+from derain.simulation.flying.precipitation import UNEVEN
+from derain.simulation.flying.regions import GroundLayer, Gusts, Plume, draw_plumes
 from derain.simulation.sensor import Returns, Sensor
 
 EVEN = Gusts("even", 1, 1, 0)
@@ -23,7 +23,7 @@ PLACES = np.random.default_rng(2).uniform(-60, 60, (10_000, 3))
     [EVEN, GroundLayer(-1.7, 0.1, EVEN), GroundLayer(-1.7, 0.8, EVEN), PLUME],
     ids=["air", "low", "high", "plume"],
 )
-def test_a_beam_is_in_the_region_on_no_more_than_its_stretch(region: Region) -> None:
+def test_a_beam_is_in_the_region_on_no_more_than_its_stretch(region) -> None:
     stretch = region.stretch(BEAMS, STRETCH)
     distance = np.linspace(1, 40, 400)
     place = BEAMS[:, None] * distance[:, None]
@@ -38,9 +38,7 @@ def test_a_beam_is_in_the_region_on_no_more_than_its_stretch(region: Region) -> 
 
 @pytest.mark.parametrize("form", UNEVEN)
 @pytest.mark.parametrize("contrast", [0.5, 2.0])
-def test_the_mean_over_many_fields_is_that_of_gaussian_ones(
-    form: GustForm, contrast: float
-) -> None:
+def test_the_mean_over_many_fields_is_that_of_gaussian_ones(form, contrast) -> None:
     fields = [Gusts(form, 2.0, contrast, seed).density(PLACES[:1000]) for seed in range(40)]
     assert np.min(fields) >= 0
     assert np.max(fields) <= 1
@@ -49,9 +47,7 @@ def test_the_mean_over_many_fields_is_that_of_gaussian_ones(
 
 @pytest.mark.parametrize("form", UNEVEN)
 @pytest.mark.parametrize("length", [0.5, 8.0])
-def test_the_density_is_alike_within_the_length_and_not_far_beyond(
-    form: GustForm, length: float
-) -> None:
+def test_the_density_is_alike_within_the_length_and_not_far_beyond(form, length) -> None:
     here, near, far = (
         Gusts(form, length, 1.0, 5).density(PLACES + np.array([shift * length, 0, 0]))
         for shift in (0, 0.05, 40)
@@ -75,7 +71,7 @@ def returns(places: np.ndarray, label: int) -> tuple[Returns, np.ndarray]:
 
 @settings(max_examples=25)
 @given(seed=st.integers(0, 2**32), x=st.floats(-30, 30), y=st.sampled_from([-4.0, 3.0]))
-def test_spray_is_behind_a_car_at_one_of_its_ends(seed: int, x: float, y: float) -> None:
+def test_spray_is_behind_a_car_at_one_of_its_ends(seed, x, y) -> None:
     generator = np.random.default_rng(seed)
     car = np.array([x, y, -1.0]) + generator.uniform(-1, 1, (50, 3)) * [2.0, 0.8, 0.5]
     kind = np.full(1, int(TrackClass.CAR))
