@@ -86,8 +86,8 @@ def _loaded(text: str, threads: int) -> Method:
     """A method by its name, and settings after a colon if there are any."""
     name, _, settings = text.partition(":")
     method, parameters = named_method(name)
-    told = (setting.partition("=") for setting in settings.split(",") if setting)
-    given = {key: yaml.safe_load(value) for key, _, value in told}
+    pairs = (setting.partition("=") for setting in settings.split(",") if setting)
+    given = {key: yaml.safe_load(value) for key, _, value in pairs}
     return load_method(method, {**parameters, **given}, threads)
 
 

@@ -7,7 +7,7 @@ Each command is killed by SIGKILL, one time in four by SIGTERM, at a moment draw
 undisturbed duration; every other time where it was finished before. Then
 
 - every file under its final name must be whole: read by derain's own readers or, where a format
-  does not say how long it is, as long as undisturbed;
+  does not hold its length, as long as undisturbed;
 - no process of it may be left, ten seconds later;
 - after SIGTERM it may leave no temporary file, and it must exit with 143;
 - the same command must succeed in the same place.

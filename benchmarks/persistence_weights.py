@@ -9,7 +9,7 @@
     python benchmarks/persistence_weights.py drives/*
 
 Prints what stands in derain/recordings/evidence.py: logistic regressions on what other scans'
-rays say, and on how points lie in their own scan, each alone. Every scan counts as much as the
+rays show, and on how points lie in their own scan, each alone. Every scan counts as much as the
 others, whatever its number of points. And what stands in export/recorded.py: what rays add to the
 log-odds of the model that comes with derain, at the points of which it is in doubt.
 """
@@ -142,10 +142,10 @@ def _pose(frame: Frame) -> NDArray[np.float64]:
 
 
 def _fitted(
-    told: NDArray[np.float64], rain: NDArray[np.bool_], weight: NDArray[np.float64]
+    evidence: NDArray[np.float64], rain: NDArray[np.bool_], weight: NDArray[np.float64]
 ) -> tuple[float, ...]:
     """Weights of a logistic regression, of which the first column is the constant."""
-    model = LogisticRegression(fit_intercept=False, max_iter=1000).fit(told, rain, weight)
+    model = LogisticRegression(fit_intercept=False, max_iter=1000).fit(evidence, rain, weight)
     return tuple(float(round(each, 2)) for each in model.coef_[0])
 
 

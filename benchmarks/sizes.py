@@ -79,7 +79,7 @@ def measured(entry: BenchEntry, frame: Frame, repeats: int) -> tuple[float, floa
         memory of the process, MiB.
     """
     memory = measure_in_process(entry, Timing([frame], threads=1, repeats=1)).peak_memory
-    assert memory is not None, "this system does not tell the largest memory of a process"
+    assert memory is not None, "this system does not measure the largest memory of a process"
     method = entry.ready(1)
     times = []
     for _ in range(repeats):

@@ -22,7 +22,7 @@ SHADES = "Blues"
 # Behind a line, by the level at the time.
 LEVELS = {Level.CLEAR: "#ffffff", Level.WARNING: "#ffe9b3", Level.ERROR: "#ffc9c2"}
 
-# What two ways tell of the same scans: by labels, and by the model.
+# Visibility in the same scans, by labels and by the model.
 ByBoth = Sequence[tuple[Visibility, Visibility]]
 
 
@@ -62,15 +62,15 @@ def draw_visibility(
     """Draws visibility by the rate of rain, and over a drive with the level of the default alarm.
 
     Args:
-        places: What is told of a place at each of the rates, by its name.
+        places: Visibility at a place at each of the rates, by its name.
         rates: Rates of rain, mm/h, rising.
-        drive: What is told of the scans of a drive, in order.
+        drive: Visibility in the scans of a drive, in order.
         path: Picture to write.
     """
     figure = Figure(figsize=(10, 3.8), layout="constrained")
     by_rate, over_drive = figure.subplots(1, 2)
-    for (name, told), colour in zip(places.items(), LINES, strict=False):
-        _draw_both(by_rate, rates, told, colour, name)
+    for (name, visibilities), colour in zip(places.items(), LINES, strict=False):
+        _draw_both(by_rate, rates, visibilities, colour, name)
     by_rate.set_xscale("log")
     by_rate.set_yscale("log")
     by_rate.set_xticks(rates, [f"{rate:g}" for rate in rates])
@@ -102,7 +102,9 @@ def draw_visibility(
     save(figure, path)
 
 
-def _draw_both(axes: Axes, places: Sequence[float], told: ByBoth, colour: str, label: str) -> None:
-    labels, model = np.array([[one.shown, other.shown] for one, other in told]).T
+def _draw_both(
+    axes: Axes, places: Sequence[float], visibilities: ByBoth, colour: str, label: str
+) -> None:
+    labels, model = np.array([[one.shown, other.shown] for one, other in visibilities]).T
     axes.plot(places, labels, color=colour, linestyle=":")
     axes.plot(places, model, color=colour, marker=".", label=label)

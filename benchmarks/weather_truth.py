@@ -36,7 +36,7 @@ RATES = (2.0, 10.0, 50.0)
 BANDS = ((0, 5), (5, 10), (10, 20))
 FEWEST_DROPS = 30
 
-# What is told of a scan: by its labels as they are, by them with the rays that returned nothing,
+# Visibility in a scan by its labels as they are, by them with the rays that returned nothing,
 # and by the model.
 WAYS = ("labels", "with missing", "default")
 
@@ -82,15 +82,18 @@ def _rows(sensor: Sensor, derainer: Derainer) -> Iterator[tuple[list[str], list[
     for place in PLACES:
         clear = LAYOUTS[place](np.random.default_rng(3)).cast(sensor)
         for rate in RATES:
-            truth = _told(*_scan(in_the_open, beams, rate, sensor), len(beams))[1]
+            truth = _visibility(*_scan(in_the_open, beams, rate, sensor), len(beams))[1]
             scan, rain = _scan(clear, beams, rate, sensor)
             by_model = derainer(scan)
-            told = [*_told(scan, rain, len(beams)), _told(scan, by_model, len(beams))[0]]
+            measured = [
+                *_visibility(scan, rain, len(beams)),
+                _visibility(scan, by_model, len(beams))[0],
+            ]
             recalls = [_recall(by_model, scan, rain, *band) for band in BANDS]
             missing = f"{1 - len(scan) / len(beams):.0%}"
-            visibilities = [f"{metres:.1f} m" for metres in (truth, *told)]
+            visibilities = [f"{metres:.1f} m" for metres in (truth, *measured)]
             row = [place, f"{rate:g}", missing, *visibilities, *recalls]
-            yield row, [metres / truth for metres in told]
+            yield row, [metres / truth for metres in measured]
 
 
 def _recall(
@@ -117,7 +120,7 @@ def _scan(
     return scan, scan.label == TrackClass.RAIN
 
 
-def _told(scan: Scan, rain: NDArray[np.bool_], beams: int) -> tuple[float, float]:
+def _visibility(scan: Scan, rain: NDArray[np.bool_], beams: int) -> tuple[float, float]:
     """Visibility of a scan, and with the rays that returned nothing, metres."""
     weather = ScanWeather.of(scan, rain)
     other, met = weather.ends.sum(axis=1)

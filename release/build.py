@@ -44,7 +44,7 @@ def built(kind: str, sources: Path, out: Path) -> Path:
     """Builds ``wheel`` or ``sdist`` of sources, and returns the file.
 
     Raises:
-        InputError: The build failed; what it said is on stderr.
+        InputError: The build failed; what it printed is on stderr.
     """
     before = set(out.glob("*"))
     command = [sys.executable, "-c", BUILD.format(kind=kind), out.resolve()]

@@ -25,7 +25,7 @@ class Environment:
         self.python = self.programs / "python"
 
     def install(self, *requirements: str | Path) -> None:
-        """Installs by pip, from the registry where pip is not told otherwise.
+        """Installs by pip, from the registry where pip is not set otherwise.
 
         Raises:
             subprocess.CalledProcessError: pip could not.
@@ -41,7 +41,7 @@ class Environment:
             cwd: Folder that it runs in; by default the environment's, where no source code lies.
 
         Raises:
-            subprocess.CalledProcessError: It failed; what it said is on stderr.
+            subprocess.CalledProcessError: It failed; what it printed is on stderr.
         """
         return subprocess.run(
             [self.programs / program, *arguments],

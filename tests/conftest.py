@@ -54,7 +54,7 @@ class Outcome:
     err: str
 
     @property
-    def said(self) -> list[str]:
+    def messages(self) -> list[str]:
         """Lines on stderr but for those on how much is called rain: random networks take half."""
         return [line for line in self.err.splitlines() if "called rain" not in line]
 
@@ -263,17 +263,17 @@ def two_sizes(monkeypatch) -> None:
 
 
 @pytest.fixture
-def saying(onnx_model, tmp_path) -> Callable[[dict[str, Any]], Path]:
-    """Makes a copy of the exported network that says something else of itself."""
+def changed_model(onnx_model, tmp_path) -> Callable[[dict[str, Any]], Path]:
+    """Makes a copy of the exported network with other metadata."""
     import onnx
 
     from derain.export.onnx_file import with_metadata
 
-    def say(metadata: dict[str, Any]) -> Path:
+    def change(metadata: dict[str, Any]) -> Path:
         proto = onnx.load(onnx_model)
         path = tmp_path / "model" / "changed.onnx"
         path.parent.mkdir(exist_ok=True)
         path.write_bytes(with_metadata(proto, metadata))
         return path
 
-    return say
+    return change

@@ -1,4 +1,4 @@
-"""The table across sensors holds what counting by hand gives, and says what it leaves out."""
+"""The table across sensors holds what counting by hand gives, and names what it leaves out."""
 
 import json
 import sys
@@ -112,7 +112,7 @@ def test_some_of_the_data_can_be_measured_alone(shared) -> None:
     assert titles == ["dry: all", "dry: pedestrian", "dry: rain", "file"]
 
 
-def test_it_says_what_it_leaves_out_and_why(written) -> None:
+def test_it_names_what_it_leaves_out_and_why(written) -> None:
     content, text = written
     assert list(content["methods"]) == ["nothing", "DROR", "everything", "places"]
     assert content["methods"]["DROR"] == {"parameters": DROR().as_dict()}
@@ -131,7 +131,7 @@ def test_what_a_method_scores_where_it_was_trained_is_marked(written) -> None:
         assert learnt == ({"DROR"} if column["title"] == "ours" else set())
 
 
-def test_cells_are_short_and_tell_a_point_from_none() -> None:
+def test_cells_are_short_and_distinguish_a_point_from_none() -> None:
     share, iou = Column("roof", "%", {}), Column("snow", "IoU", {})
     for value, text in [
         (0, "0"),

@@ -30,7 +30,7 @@ REPOSITORY = Path(__file__).resolve().parent.parent
 STUB = REPOSITORY / "derain" / "__init__.pyi"
 OFFERED = [name for name in derain.__all__ if name != "__version__"]
 
-# What an example may use without saying where it comes from, besides what its module has.
+# What an example may use without an import, besides what its module has.
 NAMES = {"derain": derain, "np": np, "torch": torch, "Trainer": Trainer}
 
 
@@ -139,7 +139,7 @@ def test_every_name_has_an_example_which_is_true(name) -> None:
     tests = doctest.DocTestFinder().find(documented, name, globs={**own_names, **NAMES})
     assert [test for test in tests if test.name == name and test.examples]
     runner = doctest.DocTestRunner(verbose=False)
-    told: list[str] = []
+    printed: list[str] = []
     for test in tests:
-        runner.run(test, out=told.append)
-    assert not runner.failures, "".join(told)
+        runner.run(test, out=printed.append)
+    assert not runner.failures, "".join(printed)

@@ -90,7 +90,7 @@ def test_a_fused_file_has_the_columns_of_rehearse_3d(tmp_path) -> None:
     np.testing.assert_array_equal(table, np.c_[fused.xyz, fused.intensity])
 
 
-def test_a_file_with_channels_names_them_and_tells_the_sensors_apart(tmp_path) -> None:
+def test_a_file_with_channels_names_them_and_marks_the_sensor_of_each_point(tmp_path) -> None:
     lidar, radar = Scan.of(scene(50)), radar_frame()
     fused = fuse(lidar, radar, PLACE, channels=["rcs", "doppler"])
     write_scan(tmp_path / "fused.npz", fused)

@@ -22,7 +22,7 @@ variants:
   broken: --broken --data.root {streets}
 """
 
-# Stands in for derain: writes what it is told to, and refuses --broken.
+# Stands in for derain: writes what its options name, and refuses --broken.
 STAND_IN = """\
 #!/bin/sh
 echo "$@" >> "{calls}"
@@ -36,7 +36,7 @@ done
 
 @pytest.fixture
 def calls(tmp_path, monkeypatch) -> Path:
-    """A file that tells how derain was called."""
+    """A file that records how derain was called."""
     stand_in, calls = tmp_path / "derain", tmp_path / "calls.txt"
     stand_in.write_text(STAND_IN.format(calls=calls))
     stand_in.chmod(0o755)
@@ -105,7 +105,7 @@ def test_a_variant_that_changed_or_was_stopped_is_trained_anew(asked, calls) -> 
     assert len(calls.read_text().splitlines()) == 9
 
 
-def test_a_variant_that_fails_says_where_to_look(asked, calls) -> None:
+def test_a_variant_that_fails_names_its_log(asked, calls) -> None:
     broken = asked.variants[2]
     reason = asked.train(broken)
     assert reason is not None

@@ -10,7 +10,7 @@ from benchmarks import make_default
 from benchmarks.make_default import MOST_LOST, MOST_TAKEN, chosen, trained
 from derain.errors import InputError
 
-# Stands in for derain: writes the checkpoint that it is told to, and fails where broken.txt is.
+# Stands in for derain: writes the checkpoint that its options name, and fails where broken.txt is.
 STAND_IN = """\
 #!/bin/sh
 echo "$@" >> "{calls}"
@@ -24,7 +24,7 @@ THRESHOLDS = (0.3, 0.4, 0.5, 0.6)
 
 @pytest.fixture
 def calls(tmp_path, monkeypatch) -> Path:
-    """A file that tells how derain was called."""
+    """A file that records how derain was called."""
     stand_in, calls = tmp_path / "derain", tmp_path / "calls.txt"
     stand_in.write_text(STAND_IN.format(calls=calls, broken=tmp_path / "broken.txt"))
     stand_in.chmod(0o755)

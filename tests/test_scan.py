@@ -1,4 +1,4 @@
-"""A scan keeps its rows, and says of each whether it can be judged."""
+"""A scan keeps its rows, and knows of each whether it can be judged."""
 
 import math
 import warnings
@@ -17,7 +17,7 @@ from derain.scan import FEWEST_ALIKE, Scan
 
 HARD_CASES = dict(hard_cases())
 
-# Whatever tells a valid point from one that is not, and its neighbours among the float32.
+# What separates a valid point from one that is not, and its neighbours among the float32.
 SPECIAL = [0.0, -0.0, -1.0, 1e-30, 1e6, 1000000.0625, 1e7, 10000001.0, 3e38, math.nan, math.inf]
 special = st.sampled_from([*SPECIAL, -math.inf])
 rows_of_four = hnp.arrays(
@@ -54,9 +54,9 @@ def can_be_judged(point: list[float], intensity: float | None) -> bool:
 
 
 @given(rows_of_four)
-def test_valid_is_what_a_look_at_each_row_says(points) -> None:
+def test_valid_is_computed_as_row_by_row(points) -> None:
     rows = points.tolist()
-    # Where not one intensity is a number, the column tells nothing of any point.
+    # Where not one intensity is a number, the column decides nothing.
     known = any(abs(row[3]) <= 1e7 for row in rows)
     expected = [can_be_judged(row[:3], row[3] if known else None) for row in rows]
     blank = [can_be_judged(row[:3], None) for row in rows]

@@ -1,4 +1,4 @@
-"""A Spec says the same after a trip through a file, or what is wrong with the file."""
+"""A Spec is the same after a trip through a file, or the error names what is wrong."""
 
 import json
 from dataclasses import replace

@@ -51,7 +51,7 @@ TOPICS = 30_000
 # What a file of a storage is called.
 FILES: dict[Storage, str] = {"ros1": "drive.bag", "sqlite3": "drive.db3", "mcap": "drive.mcap"}
 
-# Heads of clouds that say what is not so: rows, points in a row, bytes of a point and of a row.
+# Wrong heads of clouds: rows, points in a row, bytes of a point and of a row.
 LIES = (
     (1, 2**32 - 1, 16, 2**32 - 1),
     (2**32 - 1, 2**32 - 1, 16, 16),

@@ -77,7 +77,7 @@ def _feather_bomb(compression: str) -> bytes:
     return bytes(sink.getvalue()).replace(stated, struct.pack("<q", BOMB * 10**6))
 
 
-# Where the header of a LAS file says how many records follow it, and how many points: LAS 1.4 R15,
+# Where the header of a LAS file counts the records that follow it, and the points: LAS 1.4 R15,
 # table 3.
 _LAS_RECORDS, _LAS_POINTS = 100, 247
 

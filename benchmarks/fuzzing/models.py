@@ -64,7 +64,7 @@ def readers(folder: Path) -> list[Reader]:
             "model.onnx",
             _read_model,
             lambda: [path.read_bytes() for path in models],
-            [partial(_saying, models[0], partial(_with_spec, spec)) for spec in HOSTILE],
+            [partial(_changed_metadata, models[0], partial(_with_spec, spec)) for spec in HOSTILE],
             change=lambda generator: _with_metadata(generator.choice(models), generator),
         ),
         Reader(
@@ -94,19 +94,19 @@ def _read_checkpoint(path: Path) -> None:
 
 
 def _with_metadata(path: Path, generator: Random) -> bytes:
-    def say(metadata: dict[str, Any]) -> Any:
+    def change(metadata: dict[str, Any]) -> Any:
         if generator.random() < 0.5:
             return changed(metadata, generator)
         return {**metadata, "spec": changed(metadata["spec"], generator)}
 
-    return _saying(path, say)
+    return _changed_metadata(path, change)
 
 
 def _with_spec(values: dict[str, Any], metadata: dict[str, Any]) -> Any:
     return {**metadata, "spec": {**metadata["spec"], **values}}
 
 
-def _saying(path: Path, say: Callable[[dict[str, Any]], Any]) -> bytes:
+def _changed_metadata(path: Path, change: Callable[[dict[str, Any]], Any]) -> bytes:
     """A sound graph with odd metadata, whose checksum is right, so that its Spec is looked at."""
     import onnx
 
@@ -114,7 +114,7 @@ def _saying(path: Path, say: Callable[[dict[str, Any]], Any]) -> bytes:
 
     proto = onnx.load(path)
     (entry,) = (entry for entry in proto.metadata_props if entry.key == METADATA_KEY)
-    metadata = say(json.loads(entry.value) | {CHECKSUM_KEY: NO_CHECKSUM})
+    metadata = change(json.loads(entry.value) | {CHECKSUM_KEY: NO_CHECKSUM})
     entry.value = as_json(metadata).decode("utf-8", "replace")
     content = proto.SerializeToString()
     return with_checksum(content) if NO_CHECKSUM.encode() in content else content

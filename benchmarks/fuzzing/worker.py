@@ -140,9 +140,9 @@ class Worker:
             return self._connection.recv()
         self._process.join()
         code = self._process.exitcode
-        said = (self.folder / "stderr").read_text("utf-8", "replace").strip().splitlines()
+        printed = (self.folder / "stderr").read_text("utf-8", "replace").strip().splitlines()
         self.end()
-        return Outcome(number, f"ended the process ({code}): {' '.join(said[-1:])[:200]}", 0)
+        return Outcome(number, f"ended the process ({code}): {' '.join(printed[-1:])[:200]}", 0)
 
 
 def _serve(connection: Connection, seed: int, folder: Path, readers: Readers) -> None:

@@ -86,7 +86,7 @@ def _written(value: float, unit: str) -> str:
 
 
 def _percentage(value: float) -> str:
-    """With as many decimals as tell one point in a scan of a hundred thousand from none."""
+    """With enough decimals that one point of a hundred thousand is not printed as none."""
     if not value:
         return "0"
     decimals = 3 if value < 1 else 2 if value < 10 else 1

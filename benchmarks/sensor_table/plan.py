@@ -17,7 +17,7 @@ class Row:
         set: Parameters of a filter, by name.
         weights: A published state_dict of 3D-OutDet in place of a method, below the shared folder.
         card: Data card by whose statistics these weights normalise.
-        learnt_from: Columns of scans that it was trained on, as far as no record says so.
+        learnt_from: Columns of scans that it was trained on, as far as no record names them.
     """
 
     method: str = ""
@@ -40,7 +40,7 @@ class LabelledData:
         scans: Files and folders below the shared folder; the root of a data set gives its test
             part.
         simulate: Options of ``derain simulate`` that make them, in place of scans.
-        card: Data card of their labels; None as the folders tell.
+        card: Data card of their labels; None: by the folders' names.
         position: Other scans of the same data, from which places are learnt; by default the
             training part of what was simulated.
         taken: Classes of which the share that is called rain is shown in place of the IoU, for

@@ -53,8 +53,8 @@ class DataCard:
         split: Sequences of ``train``, ``validation`` and ``test``; empty without an official split.
         layout: Layout of its scans and labels.
         auto_detect: Conclusion if folders have the names of ``layout`` and nobody
-            names a card: ``nothing``; ``classes``, the names of the classes; or ``rain``, all that
-            the card says.
+            names a card: ``nothing``; ``classes``, the names of the classes; or ``rain``, all of
+            the card.
         parts: Ids of the classes of each of several data sets that it is the card of, by name; no
             file has it.
     """

@@ -16,8 +16,8 @@ NEAREST, FARTHEST = 1.5, 30.0
 # No road climbs more to either side, as the sensor sees it, than its own tilt and a ramp.
 STEEPEST_ROAD = 28.0
 
-# Slopes that are tried, degrees, and heights that are told apart, metres. Only points within so
-# many metres are asked, where a plane between two slopes is off by no more than a step of height.
+# Steps in degrees and in metres between the planes that are tried. They are fitted to points
+# within so many metres, where a plane between two slopes is off by no more than a step of height.
 STEP_OF_SLOPE, STEP_OF_HEIGHT, FARTHEST_ASKED = 2.0, 0.25, 15.0
 
 # Points that low ones are sought among.

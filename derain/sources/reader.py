@@ -19,7 +19,7 @@ class FrameReader:
     """Reads scans in the unit of their data card, with the labels that their frames have.
 
     Attributes:
-        card: Says which labels there are.
+        card: Which labels there are.
         intensity_scale: Factor from the scans' intensities to the unit of the card.
         columns: Columns to keep besides those of every scan: to a model, the others
             would only cost memory. None keeps all.

@@ -191,8 +191,8 @@ class _Window:
         # Voter by voter, which is several times faster than along the short axis.
         chosen = np.ascontiguousarray(chosen.T).view(VOTER)
         votes = chosen["difference"] <= CUTOFF
-        says_rain = chosen["ballot"] % 2 == 1
-        share: NDArray[np.float64] = (votes & says_rain).sum(axis=0) / votes.sum(axis=0)
+        for_rain = chosen["ballot"] % 2 == 1
+        share: NDArray[np.float64] = (votes & for_rain).sum(axis=0) / votes.sum(axis=0)
         return share
 
     def _differences(

@@ -50,8 +50,8 @@ def morton_code(xyz: NDArray[np.float32]) -> NDArray[np.uint64]:
 def distinct_positions(xyz: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Finds the positions that differ; points with exactly equal coordinates share one.
 
-    Dual-return sensors write the same point twice (40 % of a raw WADS scan): such copies say
-    nothing about a neighbourhood.
+    Dual-return sensors write the same point twice (40 % of a raw WADS scan): such copies add
+    nothing to a neighbourhood.
 
     Args:
         xyz: Finite coordinates, float32 (N, 3), metres.

@@ -156,8 +156,8 @@ def _beams_of_rows(inclination: NDArray[np.float64], row: NDArray[np.int64]) -> 
     ascending = np.argsort(medians)
     beams = medians[ascending]
     nearest = rows[ascending][np.searchsorted((beams[1:] + beams[:-1]) / 2, inclination)]
-    told_apart = len(beams) > 1 and np.mean(nearest == row) >= IN_OWN_ROW
-    return beams if told_apart else np.zeros(0)
+    separate = len(beams) > 1 and np.mean(nearest == row) >= IN_OWN_ROW
+    return beams if separate else np.zeros(0)
 
 
 def _beams_of_clusters(ascending: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -168,13 +168,13 @@ def _beams_of_clusters(ascending: NDArray[np.float64]) -> NDArray[np.float64]:
     typical = _typical(sizes)
     is_beam = sizes >= SPARSE * typical
     widths = (ascending[ends - 1] - ascending[starts])[is_beam]
-    told_apart = (
+    separate = (
         len(widths) > 1
         and typical >= RETURNS
         and sizes[is_beam].sum() >= IN_CLUSTERS * len(ascending)
         and widths.sum() <= COVERAGE * (ascending[-1] - ascending[0])
     )
-    return ascending[(starts + ends) // 2][is_beam] if told_apart else np.zeros(0)
+    return ascending[(starts + ends) // 2][is_beam] if separate else np.zeros(0)
 
 
 def _well_seen(degree: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -2,8 +2,8 @@
 
     python -m docs.tools.package_tree
 
-Makes a folder of links, ``build/docs/derain``, in which each package lies where pyproject.toml says
-that setuptools puts it; mkdocs.yml says that mkdocstrings looks there.
+Makes a folder of links, ``build/docs/derain``, in which each package lies where setuptools puts it;
+mkdocs.yml names that folder to mkdocstrings.
 """
 
 import shutil

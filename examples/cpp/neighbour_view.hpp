@@ -18,7 +18,7 @@
 namespace derain {
 
 // M points, of F of which there are neighbourhoods of k. Without candidates F = M, and each point
-// is scored; with them, J are, and `candidates` says where the neighbourhoods lie that they need.
+// is scored; with them, J are, and `candidates` holds where the neighbourhoods lie that they need.
 struct NeighbourView {
   std::size_t k = 0;
   std::vector<std::int64_t> first;       // (M) row of the scan that each point was taken from

@@ -108,7 +108,7 @@ class Network {
       };
       same = std::any_of(wanted.begin(), wanted.end(), is_this);
     }
-    if (!same) throw failure("its network takes other inputs than its Spec says");
+    if (!same) throw failure("its network takes other inputs than its Spec names");
   }
 
   static ONNXTensorElementDataType element_type(Element element) {

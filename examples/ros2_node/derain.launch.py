@@ -16,7 +16,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 
 NODE = Path(__file__).resolve().parent / "derain_node.py"
 
-# What may be said on the command line, with its type and default; derain_node.py explains each.
+# What may be set on the command line, with its type and default; derain_node.py explains each.
 PARAMETERS = {
     "input": (str, "/ouster/points"),
     "output": (str, "/ouster/points/clean"),

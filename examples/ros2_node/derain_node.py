@@ -176,7 +176,7 @@ class RainRemover:
 
     derainer: Derainer
     tally: Tally = field(default_factory=Tally)
-    told: set[str] = field(default_factory=set)
+    logged: set[str] = field(default_factory=set)
     alarm: Alarm = field(default_factory=Alarm)
 
     def judge(self, message: Any) -> Judgement:
@@ -193,8 +193,8 @@ class RainRemover:
 
     def news(self, judgement: Judgement) -> list[str]:
         """New kinds of warnings about a cloud."""
-        odd = [one for one in self.derainer.issues(judgement) if one.kind not in self.told]
-        self.told |= {one.kind for one in odd}
+        odd = [one for one in self.derainer.issues(judgement) if one.kind not in self.logged]
+        self.logged |= {one.kind for one in odd}
         return [one.detail for one in odd]
 
     def tally_so_far(self) -> Tally:

@@ -1,4 +1,4 @@
-"""Recordings are labelled by what a method says of them, and by nothing else."""
+"""Recordings are labelled by the answers of a method, and by nothing else."""
 
 import shutil
 from collections.abc import Callable
@@ -46,7 +46,7 @@ def of(drive: Path) -> Source:
     return named_frames([drive], labelled=True)
 
 
-def test_labels_say_rain_not_rain_and_not_known() -> None:
+def test_labels_are_rain_not_rain_and_not_known() -> None:
     points = scene(6)
     points[4] = np.nan
     scan = Scan.of(points)
@@ -60,7 +60,7 @@ def test_labels_say_rain_not_rain_and_not_known() -> None:
 
 
 @pytest.mark.parametrize("make", [Between, lambda: FilterDerainer(DROR(), 1)])
-def test_labels_are_what_the_method_says(make, make_drive, tmp_path) -> None:
+def test_labels_are_the_answers_of_the_method(make, make_drive, tmp_path) -> None:
     drive, out = make_drive(), tmp_path / "taught"
     manifest = teach(make(), of(drive), out)
     keys = [scan.key for scan in manifest.scans]
@@ -78,7 +78,7 @@ def test_labels_are_what_the_method_says(make, make_drive, tmp_path) -> None:
     assert {*contents(out)} == {CARD, TAUGHT_MANIFEST, *(f"{LABELS}/{key}.label" for key in keys)}
 
 
-def test_the_card_says_what_the_labels_mean(make_drive, tmp_path) -> None:
+def test_the_card_explains_the_labels(make_drive, tmp_path) -> None:
     teach(Between(), of(make_drive()), tmp_path / "plain")
     card = load_card(tmp_path / "plain" / CARD)
     assert (card.rain, card.unknown, {*card.classes}) == ((1,), (255,), {0, 1, 255})

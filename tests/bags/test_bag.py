@@ -53,9 +53,9 @@ def test_a_bag_that_is_cut_off_is_refused(tmp_path, storage, share) -> None:
     bag = small_bag(tmp_path, storage)
     file = storage_file(bag)
     os.truncate(file, int(share * file.stat().st_size))
-    told = refusal(lambda: read_all(bag))
-    assert "\n" not in told
-    assert "cannot be read as a bag" in told
+    message = refusal(lambda: read_all(bag))
+    assert "\n" not in message
+    assert "cannot be read as a bag" in message
 
 
 def test_an_encrypted_bag_is_refused(tmp_path) -> None:
@@ -91,7 +91,7 @@ def test_metadata_that_the_library_does_not_know_is_refused(tmp_path, change, re
     assert reason in refusal(lambda: named_frames([bag]))
 
 
-def test_metadata_may_stand_for_what_it_has_said(tmp_path) -> None:
+def test_metadata_may_stand_for_the_file_it_describes(tmp_path) -> None:
     """As Python writes it, where ROS 2 would write it out."""
     bag = small_bag(tmp_path, "sqlite3")
     metadata = yaml.safe_load((bag / "metadata.yaml").read_text("utf-8"))
@@ -107,12 +107,12 @@ def test_metadata_may_stand_for_what_it_has_said(tmp_path) -> None:
     ("name", "remedy"),
     [("drive.bag.active", "rosbag reindex"), ("drive_0.db3.zstd", "Name the bag's folder")],
 )
-def test_a_file_that_is_no_whole_bag_is_told(tmp_path, name, remedy) -> None:
+def test_a_file_that_is_no_whole_bag_is_named(tmp_path, name, remedy) -> None:
     (tmp_path / name).touch()
     assert remedy in refusal(lambda: named_frames([tmp_path / name]))
 
 
-def test_clouds_of_one_stamp_are_told_of_once(tmp_path, capsys) -> None:
+def test_clouds_of_one_stamp_are_warned_of_once(tmp_path, capsys) -> None:
     ros, clouds = Ros("mcap"), tables(4)
     times = (START, START + 5, START + 5, START + 5)
     bag = small_bag(tmp_path, "mcap", clouds=[], more=[
@@ -120,15 +120,15 @@ def test_clouds_of_one_stamp_are_told_of_once(tmp_path, capsys) -> None:
         for table, time in zip(clouds, times, strict=True)
     ])  # fmt: skip
     assert read_all(bag) == 4
-    told = capsys.readouterr().err
-    assert told.count("has the stamp of") == 1
-    assert "000002: has the stamp of" in told
+    message = capsys.readouterr().err
+    assert message.count("has the stamp of") == 1
+    assert "000002: has the stamp of" in message
 
 
 @pytest.mark.parametrize(
     ("stated", "reason"), [(10**15, "messages are stated in"), (5, "than the 5 of its index")]
 )
-def test_a_bag_with_fewer_clouds_than_it_says_is_refused(tmp_path, stated, reason) -> None:
+def test_a_bag_with_fewer_clouds_than_it_states_is_refused(tmp_path, stated, reason) -> None:
     bag = small_bag(tmp_path, "sqlite3")
     metadata = yaml.safe_load((bag / "metadata.yaml").read_text("utf-8"))
     for topic in metadata["rosbag2_bagfile_information"]["topics_with_message_count"]:

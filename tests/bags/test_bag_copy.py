@@ -1,4 +1,4 @@
-"""What a bag holds besides the messages of its topics is copied, told, or a reason to refuse."""
+"""What a bag holds besides messages is copied, warned of, or a reason to refuse."""
 
 import re
 import sqlite3
@@ -67,7 +67,7 @@ def test_messages_that_a_database_does_not_index_are_not_dropped(tmp_path, chang
         copied(bag, tmp_path / "out")
 
 
-def test_a_table_that_ros_2_does_not_know_is_told(tmp_path, capsys) -> None:
+def test_a_table_that_ros_2_does_not_know_is_warned_of(tmp_path, capsys) -> None:
     bag = small_bag(tmp_path, "sqlite3")
     change_database(bag, "CREATE TABLE notes(note TEXT)")
     copied(bag, tmp_path / "out")

@@ -90,7 +90,7 @@ def all_of(file: BinaryIO) -> list[tuple[Any, ...]]:
 def test_a_cleaned_file_keeps_all_but_the_rain(tmp_path, kind, run_derain) -> None:
     bag = record(tmp_path / "drive.mcap", Ros("mcap"), **KINDS[kind])
     outcome = run_derain("run", "ror", bag, "--out", tmp_path / "out")
-    assert (outcome.code, outcome.said) == (0, [])
+    assert (outcome.code, outcome.messages) == (0, [])
     with bag.open("rb") as old, (tmp_path / "out/drive/drive.mcap").open("rb") as new:
         assert all_of(new) == all_of(old)
     assert len(named_frames([tmp_path / "out/drive"])) == 3
@@ -131,7 +131,7 @@ def copied(path: Path, out: Path) -> Path:
         return copy.finish()
 
 
-def test_a_damaged_attachment_is_told(tmp_path) -> None:
+def test_a_damaged_attachment_is_warned_of(tmp_path) -> None:
     bag = record(tmp_path / "drive.mcap", Ros("mcap"))
     bag.write_bytes(bag.read_bytes().replace(b"a notea note", b"a notea n0te", 1))
     with pytest.raises(InputError, match="checksum of an attachment"):

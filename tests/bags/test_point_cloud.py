@@ -65,7 +65,7 @@ def test_taking_points_keeps_every_byte_of_them(cloud, data) -> None:
 
 
 @given(clouds())
-def test_columns_are_what_the_bytes_say(cloud) -> None:
+def test_columns_are_read_from_the_bytes(cloud) -> None:
     order, points = ">" if cloud.is_bigendian else "<", points_of(cloud)
     for field in cloud.fields:
         dtype = np.dtype(order + DATATYPES[field.datatype])

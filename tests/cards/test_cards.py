@@ -1,4 +1,4 @@
-"""Data cards: the packaged ones say what was published, and a user's own are read with care."""
+"""Data cards: the packaged ones hold what was published, and a user's own are read with care."""
 
 import math
 from dataclasses import replace
@@ -70,7 +70,7 @@ def test_the_rain_share_gives_the_published_class_weights(name, weights, rain) -
         assert math.isclose(card.rain_share, 0.06638644365199696, rel_tol=1e-6)
 
 
-def test_a_card_of_ones_own_holds_what_its_file_says(card_file) -> None:
+def test_a_card_of_ones_own_holds_what_is_in_its_file(card_file) -> None:
     assert written(card_file) == DataCard(
         name="our yard",
         classes={0: "ground", 3: "rain", 4: "spray"},

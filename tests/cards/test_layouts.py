@@ -1,4 +1,4 @@
-"""Where the scans and labels of a data set lie, and what the packaged data cards tell of that."""
+"""Where the scans and labels of a data set lie, and where the packaged data cards have them."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ REHEARSE3D = Layout(scans="lidar_radar_pcd", labels="lidar_radar_labels", lidar=
 CARD = "name: ours\nclasses: {0: dry, 1: wet}\nrain: [1]\n"
 
 
-def test_a_card_says_where_its_scans_lie(tmp_path) -> None:
+def test_a_card_names_where_its_scans_lie(tmp_path) -> None:
     (tmp_path / "ours.yaml").write_text(f"{CARD}layout: {{sequences: drives, labels: truth}}")
     layout = load_card(tmp_path / "ours.yaml").layout
     assert layout == Layout(sequences="drives", scans="velodyne", labels="truth", lidar="")
@@ -26,13 +26,15 @@ def test_a_folder_of_a_layout_is_one_name(tmp_path, name) -> None:
         load_card(tmp_path / "ours.yaml")
 
 
-def test_layouts_that_tell_most_go_first_and_folders_of_the_lidar_before_merged_ones() -> None:
+def test_layouts_that_identify_a_card_go_first_and_folders_of_the_lidar_before_merged_ones() -> (
+    None
+):
     assert known_layouts()[0] == REHEARSE3D
     assert set(known_layouts()) == {load_card(name).layout for name in packaged_cards()}
     assert lidar_folders() == ("innoviz", "lidar_radar_pcd", "velodyne")
 
 
-def test_folders_tell_no_more_than_their_card_says() -> None:
+def test_folders_identify_no_more_than_their_card_allows() -> None:
     by_folders = card_by_folders(REHEARSE3D, "rain")
     assert by_folders is not None
     assert by_folders.name == "REHEARSE-3D"
@@ -50,7 +52,7 @@ def test_folders_tell_no_more_than_their_card_says() -> None:
         ("7/anything/3.5.pcd", "7/labels/3.5.label"),
     ],
 )
-def test_labels_are_looked_for_where_the_folders_say(tmp_path, scan, label) -> None:
+def test_labels_are_looked_for_beside_the_folders_of_scans(tmp_path, scan, label) -> None:
     assert label_of(tmp_path / scan) == tmp_path / label
     assert tmp_path / label in label_places(tmp_path / scan)
 

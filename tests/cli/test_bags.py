@@ -34,17 +34,19 @@ def test_a_topic_is_named_by_an_option(tmp_path, run_derain) -> None:
     outcome = run_derain("run", "ror", bag, "--out", tmp_path / "out", "--topic", "/rear")
     assert (outcome.code, "rear/000000: 200 points" in outcome.out) == (0, True)
     assert json.loads(run_derain("info", bag, "--json", "--topic", "rear").out)["points"] == 200
-    told = run_derain("run", "ror", tmp_path / "out", bag, "--out", tmp_path / "o", "--topic", "/x")
-    assert told.code == 2
-    assert "/rear" in told.err
+    outcome = run_derain(
+        "run", "ror", tmp_path / "out", bag, "--out", tmp_path / "o", "--topic", "/x"
+    )
+    assert outcome.code == 2
+    assert "/rear" in outcome.err
 
 
 def test_view_draws_the_cloud_that_is_named_or_the_first(tmp_path, succeed) -> None:
     bag, picture = small_bag(tmp_path, "mcap"), tmp_path / "figure.png"
     command = ["view", "--methods", "ror", "--out", picture]
     assert "is drawn" not in succeed(*command, bag / "000001").out
-    said = succeed(*command, bag).out
-    assert f"{bag}/velodyne_points/000000 is drawn, the first of 3 clouds" in said
+    printed = succeed(*command, bag).out
+    assert f"{bag}/velodyne_points/000000 is drawn, the first of 3 clouds" in printed
     assert picture.stat().st_size > 10_000
 
 
@@ -53,11 +55,11 @@ def test_a_bag_has_the_weather_of_its_scans_as_files(tmp_path, succeed) -> None:
     files.mkdir()
     for number, cloud in enumerate(clouds):
         np.save(files / f"{number}.npy", cloud)
-    told = []
+    weather = []
     for source in (small_bag(tmp_path, "mcap", clouds=clouds), files):
         options = ("--out", tmp_path / f"of_{source.name}", "--json", "--hold", "2")
         lines = succeed("run", "dror", source, *options).out.splitlines()
-        told.append([json.loads(line)["weather"] for line in lines])
-    assert len(told[0]) == len(clouds)
-    assert told[0] == told[1]
-    assert all(one["met_rain"] for one in told[0])
+        weather.append([json.loads(line)["weather"] for line in lines])
+    assert len(weather[0]) == len(clouds)
+    assert weather[0] == weather[1]
+    assert all(one["met_rain"] for one in weather[0])

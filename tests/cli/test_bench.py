@@ -81,13 +81,13 @@ def test_units_are_scored_as_one_process_scores_and_warned_of_alike(
     arguments = ["bench", "--data", root, *methods, *ONCE, "--threads", 2, "--out"]
     one = run_derain(*arguments, tmp_path / "one")
     two = run_derain(*arguments, tmp_path / "two", "--workers", 2, "--block", 2)
-    assert one.said == two.said != []
+    assert one.messages == two.messages != []
     first = run_derain(*arguments, tmp_path / "shards", "--block", 2, "--shard", "0/2")
-    assert (first.code, "derain status" in first.out, first.said) == (0, True, [])
+    assert (first.code, "derain status" in first.out, first.messages) == (0, True, [])
     status = run_derain("status", tmp_path / "shards")
     assert (status.code, "2 of 3 units done" in status.out) == (2, True)
     last = run_derain(*arguments, tmp_path / "shards", "--block", 2, "--shard", "1/2")
-    assert one.said == last.said
+    assert one.messages == last.messages
     assert "3 of 3 units done" in succeed("status", tmp_path / "shards").out
     assert report(tmp_path / "two") == report(tmp_path / "one") == report(tmp_path / "shards")
 
@@ -118,11 +118,11 @@ def test_a_bench_that_goes_on_scores_no_unit_again_and_refuses_other_methods(
 
 
 @pytest.fixture
-def knowing(root, onnx_model, saying) -> Path:
+def knowing(root, onnx_model, changed_model) -> Path:
     """A model that was trained on the validation scans and two of the test scans."""
     spec = Derainer(onnx_model).metadata["spec"]
     trained = {"data": "simulated rain", "training": {"sequences": ["001", "002", "003"]}}
-    return saying({"spec": {**spec, **trained}})
+    return changed_model({"spec": {**spec, **trained}})
 
 
 def test_a_model_that_knows_the_scans_from_its_training_is_named(
@@ -191,7 +191,7 @@ def test_baselines_learn_nothing_from_points_that_may_be_rain_or_not(succeed, tm
         assert list(row["counts"].values()) == [4, 0, 0, 40], row["method"]
 
 
-def test_points_that_a_scan_holds_twice_are_counted_once_unless_an_option_says_otherwise(
+def test_points_that_a_scan_holds_twice_are_counted_once_unless_an_option_asks_for_all(
     succeed, tmp_path
 ) -> None:
     rows = np.random.default_rng(0).permutation(np.resize(np.arange(300), 420))

@@ -13,7 +13,7 @@ from derain.default import ModelScore, default_model, model_card
 from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
 
-SAYS = "by the model that comes with derain: "
+NAMED = "by the model that comes with derain: "
 
 
 @pytest.fixture
@@ -34,9 +34,9 @@ def test_scans_alone_are_cleaned_by_the_model_that_comes_with_derain(
     run_derain, here, words
 ) -> None:
     outcome = run_derain("run", *words, "--out", "cleaned")
-    assert (outcome.code, outcome.said) == (0, [])
+    assert (outcome.code, outcome.messages) == (0, [])
     first, *lines = outcome.out.splitlines()
-    assert first == f"{SAYS}{model_card().title}; what it is, and when not to use it: " + (
+    assert first == f"{NAMED}{model_card().title}; what it is, and when not to use it: " + (
         "derain info default"
     )
     assert len(lines) == 3
@@ -48,7 +48,7 @@ def test_scans_alone_are_cleaned_by_the_model_that_comes_with_derain(
 def test_with_json_it_is_named_beside_the_objects(succeed, here) -> None:
     outcome = succeed("run", "scans", "--out", "cleaned", "--json")
     assert [json.loads(line)["points"] for line in outcome.out.splitlines()] == [200, 200]
-    assert outcome.err.startswith(SAYS)
+    assert outcome.err.startswith(NAMED)
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,7 @@ def test_with_json_it_is_named_beside_the_objects(succeed, here) -> None:
 )
 def test_a_method_that_is_named_is_the_one_that_cleans(succeed, here, words) -> None:
     outcome = succeed("run", *words)
-    assert SAYS not in outcome.out + outcome.err
+    assert NAMED not in outcome.out + outcome.err
     assert len(judged(here / "cleaned")) == 2
 
 
@@ -100,8 +100,8 @@ def test_the_card_is_printed(run_derain, here) -> None:
     for text in (card.what, *card.not_for, *card.training, card.threshold_chosen, card.sha256):
         assert " ".join(text.split()) in squeezed
     assert max(map(len, outcome.out.splitlines())) <= 100
-    told = json.loads(run_derain("info", "default", "--json").out)
-    assert told == {"file": str(default_model()), **json.loads(json.dumps(card.as_dict()))}
+    facts = json.loads(run_derain("info", "default", "--json").out)
+    assert facts == {"file": str(default_model()), **json.loads(json.dumps(card.as_dict()))}
 
 
 def test_scores_of_a_card_are_a_table() -> None:

@@ -75,18 +75,18 @@ def test_scans_that_candidates_are_fitted_to_count_once_and_are_warned_of(
     options = ["--candidates", scan, "--card", "wads", "--inside", "0.9"]
     command = ["export", checkpoint, "--out", "outdet.onnx", *options]
     once = run_derain(*command)
-    assert once.said == []
-    # As a sensor writes them that tells two returns of every beam; WADS counts them once.
+    assert once.messages == []
+    # As a sensor of two returns writes them; WADS counts them once.
     points, labels = np.fromfile(scan, np.float32), np.fromfile(label, np.uint32)
     twice = np.concatenate([points.reshape(-1, 4), points.reshape(-1, 4)[:200]])
     twice.tofile(scan)
     np.concatenate([labels, labels[:200]]).tofile(label)
     assert run_derain(*command).out == once.out
     (twice / np.array([1, 1, 1, 256], np.float32)).tofile(scan)
-    (warning,) = run_derain(*command).said
+    (warning,) = run_derain(*command).messages
     assert warning.startswith(f"derain: warning: {scan}: mean intensity 0.")
     scaled = run_derain(*command, "--intensity-scale", "256")
-    assert (scaled.said, scaled.out) == ([], once.out)
+    assert (scaled.messages, scaled.out) == ([], once.out)
 
 
 def test_a_model_in_eight_bits_is_scaled_by_scans_like_those_it_will_see(

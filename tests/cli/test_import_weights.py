@@ -41,12 +41,12 @@ def test_normalisation_and_identity_are_two_things(succeed, facts_of, random_out
     outcome = succeed("import-weights", "outdet", "published.pt", *options)
     assert f"Wrote {out}: outdet trained on REHEARSE-3D, with the statistics of WADS" in outcome.out
     assert_same_weights(out, random_outdet)
-    said, wads, rehearse = facts_of(out)["spec"], load_card("wads"), load_card("rehearse3d")
-    assert (said["data"], said["licence"]) == (rehearse.name, rehearse.licence)
-    assert said["classes"] == {str(id_): name for id_, name in rehearse.classes.items()}
-    assert said["rain"] == [3]
-    assert (said["mean"], said["std"]) == (list(wads.mean), list(wads.std))
-    assert said["training"] == {"sequences": list(rehearse.split["train"])}
+    spec, wads, rehearse = facts_of(out)["spec"], load_card("wads"), load_card("rehearse3d")
+    assert (spec["data"], spec["licence"]) == (rehearse.name, rehearse.licence)
+    assert spec["classes"] == {str(id_): name for id_, name in rehearse.classes.items()}
+    assert spec["rain"] == [3]
+    assert (spec["mean"], spec["std"]) == (list(wads.mean), list(wads.std))
+    assert spec["training"] == {"sequences": list(rehearse.split["train"])}
 
 
 def training_checkpoint(model: SalsaNext) -> dict[str, object]:

@@ -34,15 +34,15 @@ def small(tmp_path, monkeypatch, write_labelled) -> None:
     ],
 )
 def test_another_unit_is_warned_of_once_and_can_be_scaled(succeed, command, title, scans) -> None:
-    def said(folder: str, *options: str) -> list[str]:
-        return succeed(*command.format(scans=folder, out=f"of_{folder}").split(), *options).said
+    def messages(folder: str, *options: str) -> list[str]:
+        return succeed(*command.format(scans=folder, out=f"of_{folder}").split(), *options).messages
 
-    assert said("usual") == []
-    first, *more = said("small")
+    assert messages("usual") == []
+    first, *more = messages("small")
     assert first.startswith(f"derain: warning: small/0.bin: {title}intensities of 0..1, but 0..255")
     others = f"derain: warning: {scans - 1} more scans: {title}intensity of a smaller unit"
     assert more == ([others] if scans > 1 else [])
-    assert said("small", "--intensity-scale", "1024") == []
+    assert messages("small", "--intensity-scale", "1024") == []
     for labels in Path("of_usual").rglob("*.label"):
         assert (Path("of_small") / labels.relative_to("of_usual")).read_bytes() == (
             labels.read_bytes()

@@ -43,7 +43,7 @@ def recording() -> Path:
 
 
 def weights(model: Path) -> str:
-    """What the network of a model is, whatever else the file says."""
+    """A hash of the network in a model, whatever its metadata."""
     import onnx
 
     graph = onnx.load(model).graph

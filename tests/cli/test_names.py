@@ -59,8 +59,8 @@ def test_odd_names_are_fit_for_a_terminal_and_whole_in_json(succeed, scans, comm
     assert_fit_for_a_terminal(outcome.out)
     assert r"dir\udcff\x1b[1m/" in outcome.out
     facts = [json.loads(line) for line in succeed(*words, "--json").out.splitlines()]
-    told = [each.get("scan") or each["file"] for each in facts]
-    assert told == list(map(str, scans))
+    named = [each.get("scan") or each["file"] for each in facts]
+    assert named == list(map(str, scans))
     written = {path.name for path in Path("out").glob("*.bin")}
     assert written in (set(), {path.name for path in scans})
 

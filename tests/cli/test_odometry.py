@@ -52,9 +52,9 @@ def test_poses_are_written_and_found_beside_the_scans(run_derain, recording) -> 
     out = recording.parent / "poses.txt"
     outcome = run_derain("odometry", recording, "--out", out)
     assert (outcome.code, outcome.err) == (0, "")
-    *told, summary = outcome.out.splitlines()
-    assert [line.split(": ")[0] for line in told] == list(map(str, sorted(recording.iterdir())))
-    assert re.search(r"0\.9\d m, 0\.\d\d deg, residual 0\.0\d\d m, \d\d% matched", told[2])
+    *lines, summary = outcome.out.splitlines()
+    assert [line.split(": ")[0] for line in lines] == list(map(str, sorted(recording.iterdir())))
+    assert re.search(r"0\.9\d m, 0\.\d\d deg, residual 0\.0\d\d m, \d\d% matched", lines[2])
     assert re.search(
         r"4 scans, path 2\.7 m, 0\.90 m a scan; residual median 0\.0\d+ m, worst", summary
     )

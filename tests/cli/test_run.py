@@ -44,7 +44,7 @@ def test_scans_get_their_labels_and_lose_their_rain(succeed, onnx_model, scans, 
     single, out = tmp_path / "single.npy", tmp_path / "out"
     np.save(single, scene(50))
     outcome = succeed("run", onnx_model, scans, single, "--out", out)
-    assert outcome.said == []
+    assert outcome.messages == []
     kept = ["000001.bin", "000002.bin", "000003.bin", "single.npy"]
     assert names(out) == sorted([*kept, *(f"{Path(name).stem}.label" for name in kept)])
     rain = Derainer(onnx_model)(scene(300, seed=3))
@@ -63,7 +63,7 @@ def test_json_is_one_object_a_scan_and_nothing_else(succeed, onnx_model, scans, 
     points.tofile(scans / "with_nan.bin")
     out = tmp_path / "out"
     outcome = succeed("run", onnx_model, scans, "--out", out, "--json")
-    (summary,) = outcome.said
+    (summary,) = outcome.messages
     objects = [json.loads(line) for line in outcome.out.splitlines()]
     assert [item["scan"] for item in objects] == [str(path) for path in sorted(scans.iterdir())]
     assert [item["points"] for item in objects] == [100, 200, 300, 80]
@@ -177,7 +177,7 @@ def test_cleaned_and_removed_are_the_scan_with_the_probability_as_a_column(
     scan = write_named(path)
     probability = Derainer(onnx_model).probability(scan)
     options = ("--out", out, "--removed", removed, "--probability")
-    assert succeed("run", onnx_model, path, *options).said == []
+    assert succeed("run", onnx_model, path, *options).messages == []
     rain = rain_in(out)
     assert 0 < rain.sum() < 300
     assert [file.name for file in removed.iterdir()] == [path.name]
@@ -219,5 +219,5 @@ def test_a_scan_is_projected_once_and_points_outside_the_grid_are_warned_of(
     outcome = succeed("run", salsanext_onnx, tmp_path / "scan.bin", "--out", tmp_path / "out")
     assert [points for points in projected if points] == [400]  # of none when a model is opened
     outside = (Derainer(salsanext_onnx).view.grid.pixel(points[:, :3]) < 0).mean()
-    (warning,) = outcome.said
+    (warning,) = outcome.messages
     assert f"{tmp_path / 'scan.bin'}: {outside:.0%} of the points lie outside the grid" in warning

@@ -66,8 +66,8 @@ def test_json_holds_the_weather_of_the_written_labels(succeed, recording, tmp_pa
     out = tmp_path / "out"
     outcome = succeed("run", "dror", recording, "--out", out, "--json", *LEVELS)
     alarm = Alarm(Threshold(40, 90), Threshold(5, 9), hold=2)
-    told, weathers = objects(outcome.out), weather_of(recording, out)
-    for item, weather in zip(told, weathers, strict=True):
+    found, weathers = objects(outcome.out), weather_of(recording, out)
+    for item, weather in zip(found, weathers, strict=True):
         seen = weather.visibility
         assert item == {
             "rays": weather.rays,
@@ -82,8 +82,8 @@ def test_json_holds_the_weather_of_the_written_labels(succeed, recording, tmp_pa
             "alarm": str(alarm.update(seen)),
             "shares": [rounded(row) for row in weather.shares],
         }
-    assert [item["level"] for item in told] == [*["clear"] * 2, *["warning"] * 2, *["clear"] * 2]
-    assert [item["alarm"] for item in told] == [
+    assert [item["level"] for item in found] == [*["clear"] * 2, *["warning"] * 2, *["clear"] * 2]
+    assert [item["alarm"] for item in found] == [
         *("clear", "clear", "clear", "warning", "warning", "clear")
     ]
 
@@ -109,17 +109,17 @@ def test_without_an_option_a_few_scans_are_enough_for_the_last_line(
 
 
 @pytest.mark.parametrize(
-    ("asked", "code", "told"),
+    ("asked", "code", "message"),
     [("warning", 3, "the weather was at warning or worse in 2 of 6 scans"), ("error", 0, "")],
 )
 def test_bad_weather_can_be_known_by_the_exit_code_after_all_scans(
-    run_derain, recording, tmp_path, asked, code, told
+    run_derain, recording, tmp_path, asked, code, message
 ) -> None:
     out = tmp_path / "out"
     outcome = run_derain("run", "dror", recording, "--out", out, *LEVELS, "--fail-at", asked)
     assert outcome.code == code
-    assert told in outcome.err
-    assert ("the weather was" in outcome.err) == bool(told)
+    assert message in outcome.err
+    assert ("the weather was" in outcome.err) == bool(message)
     pooled = sum(weather_of(recording, out), ScanWeather.none())
     last = outcome.out.splitlines()[-1]
     assert (
@@ -133,13 +133,13 @@ def test_a_table_has_a_line_a_scan_and_nothing_where_nothing_is_known(
 ) -> None:
     out, table = tmp_path / "out", tmp_path / "tables/weather.csv"
     arguments = ("run", "dror", recording, "--out", out, *LEVELS)
-    told = objects(succeed(*arguments, "--json").out)
+    found = objects(succeed(*arguments, "--json").out)
     lines = succeed(*arguments, "--weather", table).out.splitlines()
     with table.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert [row["scan"] for row in rows] == [str(path) for path in sorted(recording.iterdir())]
     for row, line, weather, item in zip(
-        rows, lines[:6], weather_of(recording, out), told, strict=True
+        rows, lines[:6], weather_of(recording, out), found, strict=True
     ):
         assert f", visibility {weather.visibility}, reach 15 m ({item['level']}" in line
         for name in item.keys() - {"shares"}:
@@ -161,14 +161,14 @@ def test_scans_that_are_no_recording_have_levels_and_no_alarm(
     out = tmp_path / "out"
     arguments = ("run", "dror", recording, "--out", out, "--json", *LEVELS)
     outcome = run_derain(*arguments, "--fail-at", "warning")
-    told = {
+    found = {
         Path(json.loads(line)["scan"]).stem: json.loads(line)["weather"]
         for line in outcome.out.splitlines()
     }
-    assert [told[name]["level"] for name in ("street", "000900", "field", "park")] == [
+    assert [found[name]["level"] for name in ("street", "000900", "field", "park")] == [
         *("clear", "warning", "warning", "clear")
     ]
-    assert {item["alarm"] for item in told.values()} == {None}
+    assert {item["alarm"] for item in found.values()} == {None}
     assert outcome.code == 3  # by the scans alone
 
 
@@ -219,10 +219,10 @@ def test_scans_of_which_nothing_is_known_have_no_level(
     assert len(table.read_text().splitlines()) == 1 + 5
     (tmp_path / "empty.bin").write_bytes(b"")
     outcome = succeed("run", "dror", tmp_path / "empty.bin", "--out", tmp_path / "o", "--json")
-    (told,) = objects(outcome.out)
-    assert (told.pop("rays"), told.pop("met_rain")) == (0, 0)
-    assert told.pop("shares") == [[None] * 6] * 12
-    assert set(told.values()) == {None}
+    (found,) = objects(outcome.out)
+    assert (found.pop("rays"), found.pop("met_rain")) == (0, 0)
+    assert found.pop("shares") == [[None] * 6] * 12
+    assert set(found.values()) == {None}
 
 
 @pytest.fixture

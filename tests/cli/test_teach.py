@@ -69,8 +69,8 @@ def test_truth_is_measured_for_the_record_where_a_card_explains_it(
 ) -> None:
     (drive.parent / "labels/000003.label").write_bytes(b"garbage")
     outcome = succeed("teach", "dror", drive, "--out", tmp_path / "out", "--card", "wads")
-    told = outcome.out.split("for the record only, beside WADS's own labels of 5 scans")[1]
-    rows = [line.split() for line in told.splitlines()]
+    table = outcome.out.split("for the record only, beside WADS's own labels of 5 scans")[1]
+    rows = [line.split() for line in table.splitlines()]
     assert any(row[:2] == ["car", "900"] for row in rows)
     assert any(row[:3] == ["falling-snow", "(rain)", "100"] for row in rows)
     # Garbage hinders nothing.
@@ -95,7 +95,7 @@ def test_scans_that_cannot_be_read_are_passed_over(run_derain, drive, tmp_path) 
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "message"),
     [
         (["--set", "rain_below=0"], "no rain was found"),
         (["--set", "sure_within=0"], "is sure of no point"),
@@ -103,10 +103,10 @@ def test_scans_that_cannot_be_read_are_passed_over(run_derain, drive, tmp_path) 
         (["--poses", "none.txt"], "none.txt"),
     ],
 )
-def test_what_is_wrong_is_named(run_derain, drive, tmp_path, options, told) -> None:
+def test_what_is_wrong_is_named(run_derain, drive, tmp_path, options, message) -> None:
     outcome = run_derain("teach", "between", drive, "--out", tmp_path / "out", *options)
-    assert told in outcome.err
-    assert (tmp_path / "out").exists() == ("no rain" in told)
+    assert message in outcome.err
+    assert (tmp_path / "out").exists() == ("no rain" in message)
 
 
 def test_two_scans_are_all_for_training(run_derain, succeed, drive, tmp_path) -> None:
@@ -134,8 +134,8 @@ def test_points_that_are_not_known_stay(succeed, drive, tmp_path) -> None:
     far = np.linalg.norm(points[:, :3], axis=1) >= 30
     rain = (points[:, 3] < 20) & ~far
     np.testing.assert_array_equal(read_labels(tmp_path / "out/000001.label", POINTS), rain)
-    told = f"({rain.mean():.1%} of the valid), {far.mean():.1%} not known, "
-    assert told in outcome.out.splitlines()[1]
+    message = f"({rain.mean():.1%} of the valid), {far.mean():.1%} not known, "
+    assert message in outcome.out.splitlines()[1]
     facts = json.loads(succeed(*command, "--json").out.splitlines()[1])
     assert (facts["rain"], facts["not_known"]) == (rain.sum(), far.sum())
     outcome = succeed("run", "dror", drive, "--out", tmp_path / "out", "--json")

@@ -77,10 +77,10 @@ def test_truth_colours_what_methods_do(succeed, recording, tmp_path) -> None:
     succeed("view", recording, *options, "--rerun", out)
     found = ReadBack(out)
     scan = read_scan(recording / "000.bin")
-    told = np.flatnonzero(scan.valid & (labels != 0))
-    np.testing.assert_array_equal(found.points("/sensor/scan/truth")[0], scan.xyz[told])
+    labelled = np.flatnonzero(scan.valid & (labels != 0))
+    np.testing.assert_array_equal(found.points("/sensor/scan/truth")[0], scan.xyz[labelled])
     classed = found.values("/sensor/scan/truth", "Points3D:class_ids")
-    assert classed[0] == np.where(labels[told] == 110, CLASS_RAIN, CLASS_NOT_KNOWN).tolist()
+    assert classed[0] == np.where(labels[labelled] == 110, CLASS_RAIN, CLASS_NOT_KNOWN).tolist()
     assert found.numbers("/share/scan/truth")[0] == pytest.approx(100 * 30 / scan.valid.sum())
     assert found.numbers("/share/scan/truth_not_known")[0] == pytest.approx(100 * 99 / 299)
     # The scan without labels does not show those of the one before.
@@ -113,7 +113,7 @@ def test_without_labels_there_is_no_truth(succeed, recording, tmp_path) -> None:
     options = ["--card", "wads", "--methods", "dror", "--rerun", out]
     outcome = succeed("view", recording, *options)
     first = recording / "000.bin"
-    (warning,) = outcome.said
+    (warning,) = outcome.messages
     assert f"{first}: no scan has labels" in warning
     assert not any("truth" in entity for entity in ReadBack(out).entities)
 
@@ -167,7 +167,7 @@ def test_a_scan_that_cannot_be_read_is_reported_once_and_shown_empty(
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "message"),
     [
         (["--rerun", "out.png"], "out.png: must end in .rrd"),
         (["--rerun", "out.rrd", "--frames", "9:"], "none of them is among the 4 scans"),
@@ -178,10 +178,10 @@ def test_a_scan_that_cannot_be_read_is_reported_once_and_shown_empty(
     ],
 )
 def test_what_cannot_be_meant_is_refused_and_nothing_is_written(
-    refused, recording, tmp_path, monkeypatch, options, said
+    refused, recording, tmp_path, monkeypatch, options, message
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert said in refused("view", recording, *options)
+    assert message in refused("view", recording, *options)
     assert [file.name for file in tmp_path.iterdir()] == ["drive"]
 
 

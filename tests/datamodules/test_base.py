@@ -1,4 +1,4 @@
-"""From files to batches: what a model gets to see, and what is said of files it cannot see."""
+"""From files to batches: what a model gets to see, and warnings of files that it cannot see."""
 
 import pickle
 import re
@@ -56,7 +56,7 @@ def test_what_is_not_trained_on_comes_in_order_and_untouched_in_batches_of_the_s
 
 
 @pytest.mark.parametrize("neighbours", [3, 9])
-def test_the_view_is_the_models_and_the_target_is_one_where_the_card_says_rain(
+def test_the_view_is_the_models_and_the_target_is_one_where_the_card_has_rain(
     folder, connect, neighbours
 ) -> None:
     batch = batches(connect(folder(), neighbours), "val")[0]
@@ -145,7 +145,7 @@ def test_statistics_that_the_card_lacks_are_taken_from_the_training_scans(
     write(tmp_path / "0.bin", points=scene(40))
     data = unsupervised(Folder(str(tmp_path), card, train=["0.bin"]))
     np.testing.assert_allclose(data.card.mean, scene(40).astype(np.float64).mean(axis=0))
-    assert data.card.rain_share == load_card(card).rain_share  # of which no label tells
+    assert data.card.rain_share == load_card(card).rain_share  # which no label gives
     complete = data.card
     data.complete_card(labelled=False)
     assert data.card == complete

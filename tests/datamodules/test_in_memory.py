@@ -44,7 +44,7 @@ def test_a_source_is_taken_as_it_is(tmp_path) -> None:
     assert InMemory(test=memory, card="wads").frames("test")[0].sequence == "drive"
 
 
-def test_what_cannot_be_used_is_said() -> None:
+def test_what_cannot_be_used_is_refused() -> None:
     data = InMemory(test=[Scan.of(scene(40))], card="wads")
     with pytest.raises(InputError, match="no labels"):
         data.frames("test")

@@ -109,7 +109,7 @@ def test_what_is_no_file_of_rain_rates_is_refused(tmp_path, text) -> None:
         rain_rates([tmp_path], rates)
 
 
-def test_a_card_says_where_the_labels_of_sequences_and_of_scans_lie(tmp_path, write) -> None:
+def test_a_card_names_where_the_labels_of_sequences_and_of_scans_lie(tmp_path, write) -> None:
     ours = tmp_path / "ours.yaml"
     ours.write_text(
         "name: ours\nclasses: {0: dry, 3: wet}\nrain: [3]\n"

@@ -1,4 +1,4 @@
-"""Several data sets at once: each with its labels, its weight and its place in what is told."""
+"""Several data sets at once: each with its labels, its weight and its place in the report."""
 
 from collections import Counter
 from dataclasses import replace
@@ -45,7 +45,7 @@ def mixture(**options: object) -> Mixture:
     return Mixture(parts, **{"loading": Loading(augmentation=STILL), **options})
 
 
-def test_labels_mean_what_each_parts_own_card_says() -> None:
+def test_labels_are_read_by_the_card_of_their_part() -> None:
     data = mixture()
     for frame in data.source("train"):
         scan = data.read(frame)
@@ -110,7 +110,7 @@ def trainer(**options: object) -> lightning.Trainer:
     return lightning.Trainer(accelerator="cpu", num_sanity_val_steps=0, **quiet, **options)
 
 
-def test_validation_is_of_all_parts_together_and_told_of_each(tmp_path) -> None:
+def test_validation_is_of_all_parts_together_and_reported_for_each(tmp_path) -> None:
     lightning.seed_everything(3)
     model, data = OutDet(neighbours=3), mixture()
     run = trainer(max_epochs=1, enable_checkpointing=False)
@@ -150,9 +150,9 @@ def test_the_record_holds_the_scans_of_all_parts(tmp_path, write) -> None:
     spec = agree_on_task(OutDet(neighbours=3, channels=("range",)), data).spec
     assert len(spec.training["scans"]) == 7 - 2  # the three files hold the same points
     for source, card in ((files.source("train"), files.card), (part(SNOW).source("train"), SNOW)):
-        told = training_overlap("model", spec, card, source)
-        assert told is not None
-        assert f"on {len(source)} of these {len(source)} scans" in told
+        overlap = training_overlap("model", spec, card, source)
+        assert overlap is not None
+        assert f"on {len(source)} of these {len(source)} scans" in overlap
     others = Frames.of_scans(scans(2, [0], 90))
     assert training_overlap("model", spec, SNOW, others) is None
 

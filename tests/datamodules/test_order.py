@@ -136,7 +136,7 @@ def test_processes_draw_together_what_one_draws_alone(sizes, drawn, epoch, proce
         range(len(sizes)), drawn
     )
     assert {(pick.epoch, pick.measured) for pick in alone} == {(epoch, False)}
-    # What comes twice is told apart, to be augmented in another way.
+    # What comes twice has two numbers, to be augmented in another way.
     assert len({(pick.number, pick.again) for pick in alone}) == len(alone)
 
 
@@ -159,6 +159,6 @@ def test_draws_differ_by_seed_and_epoch_and_are_known_without_the_earlier_ones()
     assert orders(57, 1, 4, 2, draws) == [epochs[-1]]
 
 
-def test_a_part_without_a_scan_of_an_epoch_is_told() -> None:
+def test_a_part_without_a_scan_of_an_epoch_is_warned_of() -> None:
     with pytest.raises(InputError, match="'dim': its weight gives it none of the 10 scans"):
         Draws.by_weight({"dim": 10, "bright": 10}, {"dim": 0.01, "bright": 1}, 10)

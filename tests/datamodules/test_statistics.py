@@ -106,7 +106,7 @@ def test_scans_without_labels_give_all_but_the_share_of_rain() -> None:
     assert unlabelled.completed(rain_share=card.rain_share) == card
 
 
-def test_what_a_card_says_is_not_measured_again() -> None:
+def test_what_a_card_states_is_not_measured_again() -> None:
     card = CARD.completed(mean=(1.0,) * 4, rain_share=0.5)
     complete = with_statistics(card, [random_scan(1, 50)])
     assert (complete.mean, complete.rain_share) == (card.mean, 0.5)

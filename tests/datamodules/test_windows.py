@@ -24,7 +24,7 @@ from derain.views.window import Window, WindowOfScans
 
 
 def drives(*lengths: int) -> Frames:
-    """Sequences of so many scans; a scan's first intensity says which it is."""
+    """Sequences of so many scans; a scan's first intensity is its number."""
     frames, number = [], 0
     for sequence, length in enumerate(lengths):
         for place in range(length):
@@ -54,10 +54,10 @@ def which(scan: Scan) -> int:
     [(0, [], [1]), (1, [0], [2]), (3, [1, 2], []), (4, [], [5]), (6, [4, 5], [])],
 )
 def test_scans_around_one_are_of_its_sequence_the_oldest_first(number, before, after) -> None:
-    frames, told = drives(4, 3), []
-    view: Any = SimpleNamespace(window=Window(before=2, after=1), of_window=told.append)
+    frames, windows = drives(4, 3), []
+    view: Any = SimpleNamespace(window=Window(before=2, after=1), of_window=windows.append)
     view_in_window(view, frames[number].read(), frames, number, lambda frame: frame.read())
-    (window,) = told
+    (window,) = windows
     assert which(window.scan) == number
     assert [which(placed.scan) for placed in window.before] == before
     assert [which(placed.scan) for placed in window.after] == after
@@ -67,12 +67,12 @@ def test_scans_around_one_are_of_its_sequence_the_oldest_first(number, before, a
 
 
 def test_a_window_reaches_over_no_gap() -> None:
-    frames, told = drives(5), []
-    view: Any = SimpleNamespace(window=Window(before=9, after=9), of_window=told.append)
+    frames, windows = drives(5), []
+    view: Any = SimpleNamespace(window=Window(before=9, after=9), of_window=windows.append)
     gap = Frames([*frames[:2], *frames[3:]])
     for number in range(4):
         view_in_window(view, gap[number].read(), gap, number, lambda frame: frame.read())
-    around = [[which(placed.scan) for placed in (*w.before, w.judged, *w.after)] for w in told]
+    around = [[which(placed.scan) for placed in (*w.before, w.judged, *w.after)] for w in windows]
     assert around == [[0, 1], [0, 1], [3, 4], [3, 4]]
 
 

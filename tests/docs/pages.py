@@ -1,4 +1,4 @@
-"""The snippets of a Markdown page or notebook, and what it says of how they are run."""
+"""The snippets of a Markdown page or notebook, and its notes on how they are run."""
 
 import json
 import re

@@ -77,7 +77,7 @@ def test_a_page_runs_from_its_first_snippet_to_its_last(page, page_folder) -> No
 
 
 def follow(snippet: Snippet, folder: Path, namespace: dict[str, Any]) -> None:
-    """Does what a snippet shows, and compares what comes of it where the page says so."""
+    """Runs what a snippet shows, and compares the output where the page asks for it."""
     if snippet.title:
         (folder / snippet.title).write_text(snippet.code, "utf-8")
     if snippet.language == "yaml":

@@ -113,7 +113,7 @@ def test_all_points_and_sure_ones_are_counted_apart() -> None:
     assert without_doubt[2].split()[-4:] == lines[1].split()[-4:]
 
 
-def test_points_at_one_position_count_once_where_the_card_says_so() -> None:
+def test_points_at_one_position_count_once_where_the_card_has_it_so() -> None:
     twice = np.tile(np.arange(len(TRUTH)), 2)
     for card, points in ((YARD, "18"), (replace(YARD, deduplicate=True), "9")):
         assert str(record_of(card, twice, SURE)).splitlines()[1].split()[2] == points

@@ -7,7 +7,7 @@ from derain.evaluation.hard_cases import hard_cases
 SCANS = dict(hard_cases(largest=50))
 
 
-def test_points_are_as_many_as_valid_and_as_distinct_as_their_names_say() -> None:
+def test_points_are_as_many_as_valid_and_as_distinct_as_their_names_promise() -> None:
     valid = {name: int(scan.valid.sum()) for name, scan in SCANS.items()}
     assert (valid["empty"], valid["one point"], valid["nothing valid"]) == (0, 1, 0)
     assert 1 < valid["fewer points than neighbours"] < 9
@@ -21,7 +21,7 @@ def test_points_are_as_many_as_valid_and_as_distinct_as_their_names_say() -> Non
         assert set(SCANS[f"intensity {intensity}"].intensity) == {int(intensity.replace(",", ""))}
 
 
-def test_points_lie_where_their_names_say() -> None:
+def test_points_lie_where_their_names_promise() -> None:
     for name, reach in (("range 1e-6 m", 1e-6), ("range 1e4 m", 1e4), ("constant image", 10)):
         np.testing.assert_allclose(SCANS[name].range, reach, rtol=1e-5)
     azimuth = np.arctan2(*SCANS["azimuth ±π"].xyz[:, 1::-1].T)

@@ -39,7 +39,9 @@ def test_points_of_lidar_and_radar_are_counted_apart_where_they_are_known(scans,
     assert fused.by_sensor == {"LiDAR": Counts(60, 790, 0, 0), "radar": Counts(30, 0, 0, 0)}
 
 
-def test_a_method_that_fails_on_a_scan_finds_nothing_there_and_says_why(scans, card) -> None:
+def test_a_method_that_fails_on_a_scan_finds_nothing_there_and_the_reason_is_printed(
+    scans, card
+) -> None:
     def fragile(scan: Scan) -> np.ndarray:
         if scan.name == "scan 1":
             raise MemoryError("no room")

@@ -31,7 +31,7 @@ def program(path: Path) -> Program:
 
     def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
         done = subprocess.run([path, *arguments], capture_output=True, text=True)
-        # Debian's onnxruntime says at its start that it knows every operator twice.
+        # Debian's onnxruntime prints at its start that it knows every operator twice.
         done.stderr = re.sub(r"Schema error: .*\n\n?", "", done.stderr)
         return done
 

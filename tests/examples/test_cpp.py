@@ -68,7 +68,7 @@ def specs() -> dict[str, Spec]:
 
 
 def metadata_at(path: Path, spec: dict[str, Any]) -> Path:
-    """Writes what a model would say of itself."""
+    """Writes the metadata of a model."""
     proof = {"points": 1, "rain_iou": float("nan"), "cases": [{"name": 'a "hard" ünë\n'}]}
     path.write_text(json.dumps({"proof": proof, "empty": [{}, []], "spec": spec}))
     return path

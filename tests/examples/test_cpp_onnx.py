@@ -84,7 +84,7 @@ def test_a_file_that_is_no_model_of_derain_is_refused(derain_onnx, tmp_path) -> 
     other = {**spec, "view": {"kind": "neighbours", "neighbours": 4}}
     for name, metadata, reason in (
         ("no_spec.onnx", {"spec": {}}, "its Spec has no proper 'network'"),
-        ("other.onnx", {"spec": other}, "its network takes other inputs than its Spec says"),
+        ("other.onnx", {"spec": other}, "its network takes other inputs than its Spec names"),
         ("text.onnx", None, ""),
         ("none.onnx", None, "there is no such file"),
     ):

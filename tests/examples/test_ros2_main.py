@@ -49,13 +49,13 @@ def test_it_runs_from_the_first_cloud_until_it_is_stopped(ros2_node, monkeypatch
         ({"queue": 0}, "queue: 0 clouds"),
     ],
 )
-def test_what_it_cannot_run_with_is_said_once_and_ends_it(
+def test_what_it_cannot_run_with_is_logged_once_and_ends_it(
     ros2_node, monkeypatch, parameters, reason
 ) -> None:
     ros = Ros(Node(threads=1, **parameters), [])
     assert run_main(ros2_node, monkeypatch, ros) == 2
-    (said,) = ros.node.logger
-    assert said.startswith(reason)
+    (logged,) = ros.node.logger
+    assert logged.startswith(reason)
     assert (ros.node.destroyed, ros.running) == (True, False)
 
 
@@ -70,7 +70,7 @@ def test_a_fault_ends_it_unless_it_is_being_stopped(ros2_node, monkeypatch) -> N
     assert run_main(ros2_node, monkeypatch, stopped) == 0
 
 
-def test_the_launch_file_says_parameters_of_the_node(ros2_node, monkeypatch) -> None:
+def test_the_launch_file_sets_parameters_of_the_node(ros2_node, monkeypatch) -> None:
     made = {
         "launch": "LaunchDescription",
         "launch.actions": "DeclareLaunchArgument",

@@ -70,7 +70,7 @@ def test_a_cloud_without_rain_is_the_same_cloud(ros2_node) -> None:
     assert result is not message
 
 
-def test_what_is_odd_is_told_once(ros2_node) -> None:
+def test_what_is_odd_is_logged_once(ros2_node) -> None:
     points = scene(600)
     points[:, 3] = 5  # which no sensor measured
     remover = ros2_node.RainRemover(Derainer(KEPT, threads=1))
@@ -124,8 +124,8 @@ def level_after(ros2_node: ModuleType, points: NDArray[np.float32], dry: str = "
     ros2_node.DerainNode(node)
     node.subscriptions["points"][1](message_of(points))
     node.timers[0][1]()
-    (said,) = node.publishers["/diagnostics"][1]
-    return {b"\0": "OK", b"\1": "WARN", b"\2": "ERROR"}[said.status[0].level]
+    (published,) = node.publishers["/diagnostics"][1]
+    return {b"\0": "OK", b"\1": "WARN", b"\2": "ERROR"}[published.status[0].level]
 
 
 @pytest.mark.usefixtures("ros")
@@ -173,7 +173,7 @@ def test_a_cloud_that_cannot_be_read_is_logged_and_the_next_one_is_cleaned(ros2_
 
 
 @pytest.mark.usefixtures("ros")
-def test_once_a_second_it_says_what_share_was_rain(ros2_node) -> None:
+def test_once_a_second_it_publishes_the_share_of_rain(ros2_node) -> None:
     points = scene(600)
     node = Node(model=str(KEPT), threads=1)
     ros2_node.DerainNode(node)
@@ -181,8 +181,8 @@ def test_once_a_second_it_says_what_share_was_rain(ros2_node) -> None:
     node.subscriptions["points"][1](message_of(points))
     report()
     report()
-    said, silent = (one.status[0] for one in node.publishers["/diagnostics"][1])
-    values = {one.key: one.value for one in said.values}
+    published, silent = (one.status[0] for one in node.publishers["/diagnostics"][1])
+    values = {one.key: one.value for one in published.values}
     judgement = Derainer(KEPT, threads=1).judge(points)
     share, visibility = judgement.rain.mean(), judgement.weather.visibility
     assert period == 1.0

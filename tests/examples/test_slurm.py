@@ -43,14 +43,14 @@ def started(folder: Path) -> list[str]:
 
 
 def test_the_script_starts_torchrun_and_goes_on_from_the_last_checkpoint(tmp_path) -> None:
-    told = get_args_parser().parse_args(started(tmp_path))
-    assert (told.nnodes, told.nproc_per_node, told.no_python) == ("2", "4", True)
-    assert told.rdzv_endpoint == "node07:24321"
-    assert told.training_script == "derain"
-    assert told.training_script_args[:5] == ["fit", *FIT]
+    parsed = get_args_parser().parse_args(started(tmp_path))
+    assert (parsed.nnodes, parsed.nproc_per_node, parsed.no_python) == ("2", "4", True)
+    assert parsed.rdzv_endpoint == "node07:24321"
+    assert parsed.training_script == "derain"
+    assert parsed.training_script_args[:5] == ["fit", *FIT]
     last = tmp_path / "runs/slurm/job_4321/checkpoints/last.ckpt"
     last.parent.mkdir(parents=True)
     last.touch()
     again = get_args_parser().parse_args(started(tmp_path)).training_script_args
     where = ["--ckpt_path", str(last.relative_to(tmp_path))]
-    assert again == [*told.training_script_args, *where]
+    assert again == [*parsed.training_script_args, *where]

@@ -84,7 +84,7 @@ def test_a_flipped_bit_is_refused_or_changes_no_answer(exported, path) -> None:
 @pytest.mark.parametrize(
     "part", ["a weight", "the threshold", "the checksum", "no text", "a byte more"]
 )
-def test_a_file_that_is_not_as_it_was_exported_says_so(exported, path, part) -> None:
+def test_a_file_that_is_not_as_it_was_exported_is_warned_of(exported, path, part) -> None:
     weights = max(onnx.load(KEPT).graph.initializer, key=lambda tensor: len(tensor.raw_data))
     changed = {
         "a weight": exported.replace(weights.raw_data[:64], weights.raw_data[1:65]),

@@ -123,8 +123,8 @@ def test_neither_order_nor_copies_nor_threads_matter(derainer, onnx_model, seed)
     np.testing.assert_allclose(of_two.probability(points), answer, atol=1e-6)
 
 
-def test_the_threshold_is_that_of_the_file(derainer, saying) -> None:
-    stricter = Derainer(saying({"spec": {**derainer.metadata["spec"], "threshold": 0.75}}))
+def test_the_threshold_is_that_of_the_file(derainer, changed_model) -> None:
+    stricter = Derainer(changed_model({"spec": {**derainer.metadata["spec"], "threshold": 0.75}}))
     np.testing.assert_array_equal(stricter(scene()), stricter.probability(scene()) > 0.75)
     assert 0 < stricter(scene()).sum() < derainer(scene()).sum()
 

@@ -1,4 +1,4 @@
-"""A file is written whole or not at all, and what killed processes leave is told from the rest."""
+"""A file is written whole or not at all, and what killed processes leave is recognised."""
 
 import errno
 import os
@@ -136,7 +136,7 @@ def test_a_folder_that_was_taken_for_abandoned_is_made_anew(
 
 
 @pytest.mark.parametrize("locks", [True, False])
-def test_what_a_killed_process_left_goes_where_it_can_be_told_from_what_is_in_use(
+def test_what_a_killed_process_left_goes_and_what_is_in_use_stays(
     tmp_path, monkeypatch, locks
 ) -> None:
     (tmp_path / f"{atomic.PREFIX}0.bin").touch()  # as earlier versions left them

@@ -1,4 +1,4 @@
-"""Small documents are read within bounds, and say what is wrong with them."""
+"""Small documents are read within bounds, and errors name what is wrong with them."""
 
 import pytest
 

@@ -155,6 +155,6 @@ def test_members_of_a_gzip_follow_one_another_and_damage_is_refused(tmp_path) ->
 
 
 def test_formats_are_listed_with_what_they_need(run_derain) -> None:
-    told = run_derain("info", "--formats").out
-    assert all(suffix in told and FORMATS[suffix].HELP in told for suffix in FORMATS)
-    assert re.search(r"^  \.las, \.laz +laser surveys \(needs derain\[las\]\)$", told, re.M)
+    printed = run_derain("info", "--formats").out
+    assert all(suffix in printed and FORMATS[suffix].HELP in printed for suffix in FORMATS)
+    assert re.search(r"^  \.las, \.laz +laser surveys \(needs derain\[las\]\)$", printed, re.M)

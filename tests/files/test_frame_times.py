@@ -50,7 +50,7 @@ def test_suffix_and_zeros_before_a_name_make_no_difference(tmp_path, frame) -> N
         ("frame,timestamp\n0,1\n000.pcd,2\n", r"gives 000\.pcd two times"),
     ],
 )
-def test_what_does_not_say_when_is_refused(tmp_path, text, reason) -> None:
+def test_what_holds_no_time_is_refused(tmp_path, text, reason) -> None:
     scans = written(tmp_path, text, "000000.bin")
     with pytest.raises(InputError, match=rf"metadata\.csv: {reason}") as refusal:
         read_frame_times(scans)

@@ -135,7 +135,7 @@ def test_the_sweep_goes_once_around_from_behind_where_y_is_any_zero() -> None:
 
 @settings(max_examples=100)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.integers(2, 12), st.floats(0.3, 30))
-def test_the_published_variant_does_what_its_formulas_say(seed, points, neighbours, size) -> None:
+def test_the_published_variant_follows_its_formulas(seed, points, neighbours, size) -> None:
     generator = np.random.default_rng(seed)
     place = generator.normal(size=(points, 3)) * [size, size, 1]
     intensity = generator.choice([0, 0, 1, 1.5, 2, 2.5, 9], points)
@@ -207,7 +207,7 @@ def test_nothing_is_called_rain_without_rain_or_where_it_is_as_bright_as_all_els
 
 
 @pytest.mark.parametrize("variant", ["fitted", "published"])
-def test_without_intensity_nothing_is_found_and_that_is_said(variant) -> None:
+def test_without_intensity_nothing_is_found_and_a_warning_is_given(variant) -> None:
     scan, filter_ = Scan.of(scene()), CRF(variant=variant)
     assert not list(filter_.issues(scan))
     for blind in (replace(scan, intensity=None), replace(scan, intensity=0 * scan.intensity)):

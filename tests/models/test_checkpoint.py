@@ -169,7 +169,7 @@ def test_a_compressed_checkpoint_is_refused(content, path, read) -> None:
         read(path)
 
 
-def test_published_weights_do_not_say_how_much_memory_to_take() -> None:
+def test_published_weights_do_not_decide_how_much_memory_is_taken() -> None:
     tensors = {name: torch.zeros(1) for name in PUBLISHED_KEYS.values()}
     tensors["convs.0.conv1.dw"] = torch.zeros(1).expand(10**7)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -205,7 +205,7 @@ def test_code_in_a_file_does_not_run(content, tmp_path, path, writer, read) -> N
     with pytest.raises(InputError, match=rf"model\.ckpt: {DAMAGED}"):
         read(path)
     assert not witness.exists()
-    # The file is what it is meant to be: torch would run the code if it were told to.
+    # The file is what it is meant to be: torch would run the code if it were allowed to.
     with suppress(RuntimeError):
         torch.load(path, weights_only=False)
     assert witness.exists()

@@ -123,7 +123,7 @@ def test_rows_in_another_order_are_judged_alike(exported) -> None:
     np.testing.assert_allclose(shuffled, exported.probability(scan)[order], atol=1e-4)
 
 
-def test_scans_of_a_batch_say_nothing_to_each_other(trained) -> None:
+def test_scans_of_a_batch_do_not_influence_each_other(trained) -> None:
     view = trained.spec.make_view()
     scans = [labelled(30), labelled(31, drops=30)]
     samples = [

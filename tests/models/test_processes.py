@@ -47,7 +47,7 @@ def test_two_processes_find_what_one_finds(folder) -> None:
         )
         assert one == two
         assert len(one) == len(POINTS)
-    # The first process tells what all of them did, and no other says it again.
+    # The first process prints what all of them did, and no other prints it again.
     assert finished.stdout.count("mean over scans") == len(two_processes.NETWORKS)
-    said = f"Wrote {len(POINTS)} label files to "
-    assert finished.stdout.count(said) == len(two_processes.NETWORKS)
+    printed = f"Wrote {len(POINTS)} label files to "
+    assert finished.stdout.count(printed) == len(two_processes.NETWORKS)

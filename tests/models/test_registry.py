@@ -30,7 +30,7 @@ def test_derain_has_these_networks_and_each_knows_its_name() -> None:
     assert published == {"lisnownet", "outdet", "salsanext"}
 
 
-def test_a_network_that_was_given_no_name_is_told_how_to_get_one() -> None:
+def test_a_network_without_a_name_is_refused_with_the_remedy() -> None:
     demanded = {name: lambda *_: None for name in DerainingModule.__abstractmethods__}
     nameless = type("Nameless", (DerainingModule,), demanded)
     with pytest.raises(InputError, match=r"Nameless: the network has no name\. Put @NETWORKS\.add"):

@@ -139,7 +139,7 @@ def test_it_learns_drops_and_is_blind_to_intensity(trained, tmp_path, monkeypatc
     np.testing.assert_array_equal(derainer(bright), called)
 
 
-def test_scans_of_a_batch_say_nothing_to_each_other(trained) -> None:
+def test_scans_of_a_batch_do_not_influence_each_other(trained) -> None:
     view = trained.spec.make_view(threads=1)
     scans = [labelled(1), labelled(2, drops=5), Scan.of(scene(40))]
     samples = [Sample(scan, view(scan), None) for scan in scans]
@@ -150,7 +150,7 @@ def test_scans_of_a_batch_say_nothing_to_each_other(trained) -> None:
 
 
 def test_it_takes_no_candidates(trained) -> None:
-    """What it says of a point depends on all the others, so that none may be left out."""
+    """Its answer for a point depends on all the others, so that none may be left out."""
     candidates = Candidates((Bound("range", most=20.0),))
     view = trained.spec.make_view()
     assert trained.accepts_view(view)

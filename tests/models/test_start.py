@@ -1,4 +1,4 @@
-"""A training that begins from a trained model goes on from what that one says."""
+"""A training that begins from a trained model starts with its answers."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -39,7 +39,7 @@ def data(card: DataCard, first: int, shift: float = 0.0) -> InMemory:
 
 
 def trained(model: DerainingModule, card: DataCard, first: int, path: Path) -> DerainingModule:
-    """A model that has learnt a little, as its checkpoint says it."""
+    """A model that has learnt a little, with its Spec."""
     lightning.seed_everything(first)
     run = lightning.Trainer(
         max_epochs=2,
@@ -84,7 +84,7 @@ def test_the_first_logits_are_those_of_the_start(kind, tmp_path) -> None:
         assert student.hparams.get(argument) == recipe.hparams.get(argument)
 
 
-def test_the_record_says_what_it_began_from_and_all_that_both_have_seen(tmp_path) -> None:
+def test_the_record_names_what_it_began_from_and_all_that_both_have_seen(tmp_path) -> None:
     source = trained(OutDet(neighbours=3), FIRST, 0, tmp_path / "one.ckpt")
     student = started(OutDet(), tmp_path / "one.ckpt", "one")
     (one,) = agree_on_task(student, data(OTHER, 10)).spec.training[STARTED_FROM]

@@ -38,7 +38,7 @@ def make(request, small_grid) -> MakeModel:
     return lambda **options: SalsaNext(grid=small_grid, width=4, **options)
 
 
-def test_the_rarer_class_counts_for_as_much_more_as_it_is_told(make) -> None:
+def test_the_rarer_class_weighs_as_much_more_as_the_option_states(make) -> None:
     scans = [taught(seed) for seed in range(2)]
     weights = {}
     for balance in (0.0, 0.5, 1.0):
@@ -55,14 +55,14 @@ def test_what_is_not_known_moves_no_weight(make) -> None:
     scan = taught(0)
     unknown = scan.label == 255
     losses = []
-    for model_says_rain in (False, True):
+    for model_finds_rain in (False, True):
         model = make()
         agree_on_task(model, InMemory(train=[scan], card=CARD))
         view = model.spec.make_view()(scan)
         batch = Batch.of([Sample.of(scan, view, CARD)])
         of_unknown = torch.from_numpy(view.target(unknown) == 1)
         logits = torch.zeros(view.size, 2)
-        logits[of_unknown, int(model_says_rain)] = 5.0
+        logits[of_unknown, int(model_finds_rain)] = 5.0
         logits.requires_grad_()
         loss = model.segmentation_loss(logits, batch.target).total
         loss.backward()

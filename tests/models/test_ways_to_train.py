@@ -134,9 +134,7 @@ def test_batches_that_were_made_before_are_trained_on_too(make_trainer, memory, 
     assert trainer.callback_metrics["val/loss"].isfinite()
 
 
-def test_a_model_that_was_told_nothing_of_its_batches_says_what_it_lacks(
-    make_trainer, memory
-) -> None:
+def test_a_model_without_its_data_module_names_what_it_lacks(make_trainer, memory) -> None:
     loader = scan_loader(memory.source("train"), "train", agree_on_task(OutDet(), memory))
     with pytest.raises(InputError, match=r"Call .*agree_on_task\(model, data\)"):
         make_trainer(epochs=1).fit(OutDet(), loader)

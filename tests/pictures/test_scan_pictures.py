@@ -187,7 +187,7 @@ def test_a_picture_is_saved_as_png_and_nothing_stays_where_it_cannot_be(tmp_path
     assert [file.name for file in tmp_path.iterdir()] == ["new"]
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="a variable tells where a screen is")
+@pytest.mark.skipif(sys.platform != "linux", reason="a variable names the screen")
 def test_without_a_screen_a_window_is_refused(monkeypatch) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)

@@ -1,4 +1,4 @@
-"""Odometry finds known motions, the same on any number of threads, and says where it fails."""
+"""Odometry finds known motions, the same on any number of threads, and reports where it fails."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -87,7 +87,7 @@ def poses_of(odometry: Odometry, scans: list[Scan]) -> np.ndarray:
     return np.array([odometry.register(scan).pose for scan in scans])
 
 
-def test_a_gap_is_told_and_bridged_where_the_scans_still_meet(driven) -> None:
+def test_a_gap_is_reported_and_bridged_where_the_scans_still_meet(driven) -> None:
     # From 1.3 m a scan to 4 m: two scans are missing.
     scans, poses = drive([*STEPS, motion(3.9), motion(1.3)])
     odometry = Odometry()
@@ -104,7 +104,9 @@ def test_a_gap_is_told_and_bridged_where_the_scans_still_meet(driven) -> None:
         (Scan.of(np.full((100, 3), 10.0)), "has only 1 surfaces in reach"),
     ],
 )
-def test_what_cannot_be_registered_is_told_and_the_motion_goes_on(driven, other, reason) -> None:
+def test_what_cannot_be_registered_is_reported_and_the_motion_goes_on(
+    driven, other, reason
+) -> None:
     scans, _ = driven
     odometry = Odometry()
     found = [odometry.register(scan) for scan in (scans[0], scans[1], other, scans[2], scans[3])]
@@ -115,7 +117,7 @@ def test_what_cannot_be_registered_is_told_and_the_motion_goes_on(driven, other,
     assert_is(found[4].motion, STEPS[2], 0.03, 0.1)
 
 
-def test_a_scan_that_sees_nothing_at_first_is_told_of_by_the_next() -> None:
+def test_a_first_scan_that_sees_nothing_is_reported_with_the_next() -> None:
     odometry = Odometry()
     first = odometry.register(NOTHING)
     second = odometry.register(scan_from(np.eye(4), 0))
@@ -138,7 +140,7 @@ def test_a_bare_road_that_shows_no_way_along_it_is_not_trusted() -> None:
 
 
 @pytest.mark.parametrize("degrees", [0, 1e-9, 1e-3, 1, 90, 179.999, 180])
-def test_a_turn_is_told_to_the_last_digits(degrees) -> None:
+def test_a_turn_is_exact_to_the_last_digits(degrees) -> None:
     assert turn_of(motion(5, 5, yaw=degrees)) == pytest.approx(degrees, abs=1e-10)
 
 
@@ -179,7 +181,7 @@ GOOD = Fit(np.eye(4), converged=True, residual=0.03, matched=0.9, facing=0.05)
         ({"converged": False}, "did not converge"),
     ],
 )
-def test_each_fault_is_told(fault, reason) -> None:
+def test_each_fault_is_named(fault, reason) -> None:
     assert reason in Trust().misfit(replace(GOOD, **fault))
 
 

@@ -94,8 +94,8 @@ def test_of_a_scan_alone_nothing_is_known_and_nothing_is_taken() -> None:
     assert not answer.known.any()
     assert not answer.rain.any()
     assert answer.probability[is_drop(answer.scan)].mean() > 0.5
-    told = [issue.kind for issue in PersistenceDerainer().issues(answer)]
-    assert told == ["nothing is known for sure"]
+    expected = [issue.kind for issue in PersistenceDerainer().issues(answer)]
+    assert expected == ["nothing is known for sure"]
 
 
 def test_no_evidence_is_taken_across_a_gap() -> None:
@@ -112,7 +112,7 @@ def test_no_evidence_is_taken_across_a_gap() -> None:
     assert not (answers[1].probability == alone.probability).all()
 
 
-def test_a_registration_that_fails_is_told_of() -> None:
+def test_a_registration_that_fails_is_warned_of() -> None:
     frames = drive(3, posed=False)
     nonsense = Scan.of(np.random.default_rng(0).uniform(-30, 30, (4000, 3)), "nonsense")
     frames[2] = MemoryFrame(key="2", number=2, scan=nonsense)
@@ -171,7 +171,7 @@ def test_hard_cases_are_answered() -> None:
 
 
 @pytest.mark.parametrize(
-    ("parameters", "told"),
+    ("parameters", "expected"),
     [
         ({"before": -1}, "before: -1 is not"),
         ({"after": 51}, "after: 51 is not"),
@@ -180,10 +180,10 @@ def test_hard_cases_are_answered() -> None:
         ({"reach": 3}, "it has no parameter reach. It has before, after, sure."),
     ],
 )
-def test_wrong_parameters_are_refused(parameters, told) -> None:
+def test_wrong_parameters_are_refused(parameters, expected) -> None:
     with pytest.raises(InputError) as refused:
         load_method("persistence", parameters)
-    assert told in str(refused.value)
+    assert expected in str(refused.value)
 
 
 def test_real_snow_is_found_by_free_space(shared) -> None:

@@ -40,11 +40,11 @@ def lines(ahead: list[float]) -> str:
     return "".join(f"1 0 0 {x} 0 1 0 0 0 0 1 0\n" for x in ahead)
 
 
-def test_odometry_gives_poses_and_tells_of_each(drive) -> None:
-    told: list[tuple[Frame, Registration]] = []
-    posed = with_poses(drive, "odometry", on_registration=lambda *each: told.append(each))
-    assert [frame.key for frame, _ in told] == [frame.key for frame in drive]
-    for number, (frame, (_, registration)) in enumerate(zip(posed, told, strict=True)):
+def test_odometry_gives_poses_and_reports_each(drive) -> None:
+    registered: list[tuple[Frame, Registration]] = []
+    posed = with_poses(drive, "odometry", on_registration=lambda *each: registered.append(each))
+    assert [frame.key for frame, _ in registered] == [frame.key for frame in drive]
+    for number, (frame, (_, registration)) in enumerate(zip(posed, registered, strict=True)):
         np.testing.assert_array_equal(frame.pose, registration.pose)
         error = np.linalg.inv(np.linalg.matrix_power(STEP, number)) @ frame.pose
         assert shift_of(error) < 0.05
@@ -144,17 +144,17 @@ def test_without_a_word_poses_beside_the_scans_count_and_odometry_fills_in(drive
         for number, frame in enumerate(drive[:2]):
             write_scan(tmp_path / name / f"{number:06d}.pcd", frame.read())
     (tmp_path / "known/poses.txt").write_text(lines([40, 50]))
-    told: list[str] = []
+    registered: list[str] = []
     posed = with_poses(
         named_frames([tmp_path / "known", tmp_path / "unknown"], layouts=()),
-        on_registration=lambda frame, _: told.append(frame.name),
+        on_registration=lambda frame, _: registered.append(frame.name),
     )
     assert x_of(posed)[:3] == [40, 50, 0]
     assert posed[3].pose[0, 3] == pytest.approx(1.3, abs=0.05)
-    assert told == [str(tmp_path / f"unknown/00000{number}.pcd") for number in range(2)]
+    assert registered == [str(tmp_path / f"unknown/00000{number}.pcd") for number in range(2)]
 
 
-def test_a_record_that_is_damaged_is_told_and_not_passed_over(drive, tmp_path) -> None:
+def test_a_record_that_is_damaged_is_named_and_not_passed_over(drive, tmp_path) -> None:
     write_scan(tmp_path / "a/0.pcd", drive[0].read())
     (tmp_path / "a/poses.txt").write_text("damaged")
     with pytest.raises(InputError, match="line 1 is not 12 numbers"):

@@ -49,7 +49,7 @@ def test_rays_end_at_a_wall_and_go_through_a_drop_before_it() -> None:
     assert (evidence.through[~of_drop] == 0).all()
 
 
-def test_where_there_are_no_rays_nothing_is_said() -> None:
+def test_where_there_are_no_rays_nothing_is_known() -> None:
     places = wall(20)
     for other in (-wall(20), np.zeros((0, 3)), wall(20)[:3]):
         evidence = ray_evidence(places, Rays(other, 1), STEP)
@@ -60,7 +60,7 @@ def test_where_there_are_no_rays_nothing_is_said() -> None:
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_it_is_what_asking_every_ray_says(seed) -> None:
+def test_it_is_what_a_search_of_every_ray_finds(seed) -> None:
     generator = np.random.default_rng(seed)
     clouds = [
         wall(generator.uniform(5, 30), 6, 8) * generator.uniform(0.97, 1.03, (48, 1))

@@ -31,7 +31,7 @@ def wheel(distributions) -> Path:
     return distributions[0]
 
 
-def test_their_names_tell_the_one_version(distributions) -> None:
+def test_their_names_hold_the_one_version(distributions) -> None:
     wheel, sdist = distributions
     assert wheel.name == f"derain-{__version__}-py3-none-any.whl"
     assert sdist.name == f"derain-{__version__}.tar.gz"
@@ -66,7 +66,7 @@ def test_the_wheel_alone_runs_away_from_the_repository(wheel, tmp_path) -> None:
     with ZipFile(wheel) as archive:
         archive.extractall(tmp_path / "installed")
     code = "import derain, sys; from derain.cli.main import main; print(derain.__file__); main()"
-    said = [
+    printed = [
         subprocess.run(
             [sys.executable, "-c", code, *command],
             cwd=tmp_path,
@@ -76,10 +76,10 @@ def test_the_wheel_alone_runs_away_from_the_repository(wheel, tmp_path) -> None:
         )
         for command in (["--version"], ["info", "default"])
     ]
-    for finished in said:
+    for finished in printed:
         assert finished.stdout.startswith(str(tmp_path / "installed")), finished.stderr
-    assert said[0].stdout.endswith(f"derain {__version__}\n")
-    assert "default, version" in said[1].stdout
+    assert printed[0].stdout.endswith(f"derain {__version__}\n")
+    assert "default, version" in printed[1].stdout
 
 
 def test_a_file_that_the_source_distribution_lacks_is_named() -> None:

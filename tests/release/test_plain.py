@@ -122,7 +122,7 @@ def test_scans_are_cleaned_looked_at_and_labelled(plain, scan) -> None:
     assert (scan.parent / "cleaned/scan.label").stat().st_size == 4 * 200
 
 
-def test_methods_are_compared_and_the_picture_is_said_to_be_missing(plain, scan) -> None:
+def test_methods_are_compared_and_the_missing_picture_is_mentioned(plain, scan) -> None:
     bench = ["bench", "--data", str(scan), "--card", "wads", "--methods"]
     bench += ["default", "dror", "position", "all", "--train", str(scan)]
     bench += ["--timed", "1", "--repeats", "1", "--out", "bench"]
@@ -138,7 +138,7 @@ def test_methods_are_compared_and_the_picture_is_said_to_be_missing(plain, scan)
     assert "pip install 'derain[view]'" in err
 
 
-def test_a_command_whose_extra_is_missing_says_so_in_one_line_before_any_work(plain, scan) -> None:
+def test_a_command_names_its_missing_extra_in_one_line_before_any_work(plain, scan) -> None:
     given, checkpoint = str(scan), str(default_model().with_suffix(".ckpt"))
     arrow, survey, bag = (scan.with_suffix(suffix) for suffix in (".feather", ".las", ".bag"))
     for file in (arrow, survey, bag):
@@ -183,7 +183,7 @@ def test_a_command_whose_extra_is_missing_says_so_in_one_line_before_any_work(pl
     assert {*scan.parent.iterdir()} == before
 
 
-def test_an_import_that_no_command_saw_coming_is_told_too(plain) -> None:
+def test_an_import_that_no_command_saw_coming_is_reported_too(plain) -> None:
     code = (
         "import sys\n"
         "from derain.cli import main\n"
@@ -199,7 +199,7 @@ def test_an_import_that_no_command_saw_coming_is_told_too(plain) -> None:
     assert exit_code == "2"
 
 
-def test_python_is_told_which_extra_brings_a_name(plain) -> None:
+def test_an_attribute_names_the_extra_that_brings_it(plain) -> None:
     code = (
         "import derain, pydoc\n"
         "for name in ('Wads', 'OutDet'):\n"

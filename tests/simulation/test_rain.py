@@ -149,7 +149,7 @@ def crowded(clear: Returns, generator: Generator, monkeypatch: pytest.MonkeyPatc
     some = draw_drops(25, np.minimum(clear.range, 15), SENSOR, generator)
     diameter = draw_diameters(25, 10 * len(some.beam), generator)
     drops = Drops(np.tile(some.beam, 10), np.tile(some.range, 10), diameter)
-    # The same place twice is the same range twice: told apart, the last return is one of them.
+    # The same place twice is the same range twice: kept apart, the last return is one of them.
     drops = Drops(drops.beam, drops.range * generator.uniform(0.9, 1, len(diameter)), diameter)
     monkeypatch.setattr(rain_module, "draw_drops", lambda *_: drops)
     return drops

@@ -122,7 +122,7 @@ def test_a_rosette_has_no_beams_outside_its_circle(about) -> None:
         assert corner.sum() > 100
 
 
-def test_cells_tell_nothing_of_beams_that_are_not_in_rows_and_columns() -> None:
+def test_cells_give_no_beams_that_are_not_in_rows_and_columns() -> None:
     returned = np.random.default_rng(9).random(24_000) < 0.8
     xyz = np.where(returned[:, None], rosette(24_000) * 20, np.nan).astype(np.float32)
     beams = beams_of(Scan(xyz, shape=(100, 240)))

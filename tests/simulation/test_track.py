@@ -92,7 +92,7 @@ SENSOR = Sensor(rows=16, columns=40)
 
 
 @pytest.mark.parametrize("roughness", [0.0, 0.6])
-def test_flat_ground_lies_where_its_angle_says_and_darkens_with_it(open3d, roughness) -> None:
+def test_flat_ground_lies_at_its_angle_and_darkens_with_it(open3d, roughness) -> None:
     plane = shapes.rectangle((-500, 500), (-500, 500), 0)
     track = Track.of([Surface(plane, TrackClass.ROAD, 0.3, roughness)])
     track.cast(Sensor(rows=4, columns=10))  # another sensor sees the same track

@@ -141,16 +141,16 @@ def test_clouds_without_coordinates_are_refused(tmp_path, columns, reason) -> No
     assert str(error.value.subject).endswith("velodyne_points/000000")
 
 
-def test_other_fields_on_the_way_are_told_once(tmp_path, capsys) -> None:
+def test_other_fields_on_the_way_are_warned_of_once(tmp_path, capsys) -> None:
     first, *others = tables(4)
     fewer = table_of({name: first[name] for name in "xyz"})
     source = named_frames([small_bag(tmp_path, "mcap", clouds=[fewer, *others])])
     intensities = [frame.read().intensity is None for frame in source]
 
     assert intensities == [True, False, False, False]
-    told = capsys.readouterr().err
-    assert told.count("its fields differ") == 1
-    assert "000001" in told
+    printed = capsys.readouterr().err
+    assert printed.count("its fields differ") == 1
+    assert "000001" in printed
 
 
 def test_what_is_passed_over_beside_bags_is_counted(tmp_path, capsys) -> None:

@@ -59,7 +59,7 @@ def test_only_the_clouds_change_and_as_files_do(
     bag = small_bag(tmp_path, storage)
     for _ in range(2):  # the second time in place of an earlier bag
         outcome = run_derain(*RUN, bag, "--out", tmp_path / "out")
-        assert (outcome.code, outcome.said) == (0, [])
+        assert (outcome.code, outcome.messages) == (0, [])
     made = bag_path(tmp_path / "out", storage)
 
     assert sorted(os.listdir(tmp_path / "out")) == [made.name]
@@ -97,7 +97,7 @@ def test_what_was_removed_can_be_kept(tmp_path, storage, run_derain, rain_of_fil
             np.testing.assert_array_equal(columns["x"], table["x"][rain == bool(value)])
 
 
-def test_points_can_say_how_probably_they_are_rain(tmp_path, run_derain) -> None:
+def test_points_can_hold_their_probability_of_rain(tmp_path, run_derain) -> None:
     columns = {name: tables(1)[0][name] for name in ("x", "y", "z", "intensity")}
     taken = table_of({**columns, "rain_probability": np.zeros(300, np.uint16)})
     bag = small_bag(tmp_path, "mcap", clouds=[*tables(), taken])
@@ -127,7 +127,7 @@ def test_an_organised_cloud_can_keep_its_shape(tmp_path, run_derain, rain_of_fil
     assert shapes == [(1, clean, clean), (10, 30, clean)]
 
 
-def test_a_cloud_that_cannot_be_cleaned_stays_and_is_told(tmp_path, run_derain) -> None:
+def test_a_cloud_that_cannot_be_cleaned_stays_and_is_named(tmp_path, run_derain) -> None:
     first, far, last = tables(3)
     far["x"] *= 1000  # no point has a neighbour
     lost, empty = np.ones(4, [("a", "f4")]), last[:0]
@@ -169,7 +169,7 @@ def test_several_bags_and_scans_are_cleaned_in_one_run(tmp_path, run_derain) -> 
     cloud = small_bag(tmp_path, "mcap", "c") / "000001"
     np.save(tmp_path / "scan.npy", tables(1)[0])
     outcome = run_derain(*RUN, *bags, tmp_path / "scan.npy", cloud, "--out", tmp_path / "out")
-    assert (outcome.code, outcome.said) == (0, [])
+    assert (outcome.code, outcome.messages) == (0, [])
     files = ["c/000001.label", "c/000001.pcd", "scan.label", "scan.npy"]
     assert sorted(os.listdir(tmp_path / "out")) == ["a", "b.bag", "c", "scan.label", "scan.npy"]
     assert all((tmp_path / "out" / file).exists() for file in files)
@@ -275,7 +275,7 @@ def test_bags_of_one_name_in_a_folder_of_recordings_are_written_apart(
     assert [frame.sequence for frame in frames] == [*3 * ["a/drive"], *3 * ["b/drive"]]
     once = run_derain(*RUN, bag, "--out", tmp_path / "once")
     outcome = run_derain(*RUN, tmp_path / "fleet", "--topic", POINTS, "--out", tmp_path / "out")
-    assert (once.code, outcome.code, outcome.said) == (0, 0, [])
+    assert (once.code, outcome.code, outcome.messages) == (0, 0, [])
     for name in ("a", "b"):
         made = bag_path(tmp_path / "out" / name, storage)
         assert read_bag(made) == read_bag(bag_path(tmp_path / "once", storage))

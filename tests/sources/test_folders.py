@@ -99,14 +99,14 @@ def test_what_is_passed_over_in_a_folder_is_counted_once(tmp_path, folder, capsy
     assert f"{place}: 1 .bag, 2 .csv, 1 .mcap, 1 .txt passed over" in warning
 
 
-def test_nothing_is_said_of_a_folder_whose_scans_are_all_taken(tmp_path, wads, capsys) -> None:
+def test_no_warning_is_given_for_a_folder_whose_scans_are_all_taken(tmp_path, wads, capsys) -> None:
     touch(tmp_path / "texts/0.csv", tmp_path / "texts/times.txt", tmp_path / "texts/0.txt.label")
     named_frames([wads, tmp_path / "texts", tmp_path / "texts/0.csv"])
     assert capsys.readouterr().err == ""
 
 
 @pytest.mark.parametrize("layout", [Layout(), REHEARSE3D, DRIVES])
-def test_labels_lie_where_the_layout_says(tmp_path, layout) -> None:
+def test_labels_lie_where_the_layout_puts_them(tmp_path, layout) -> None:
     sequence = tmp_path / layout.sequences / "7"
     touch(sequence / layout.scans / "3.bin.gz", sequence / layout.labels / "3.label")
     (frame,) = sequence_frames([sequence], layout)

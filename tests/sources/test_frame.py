@@ -35,7 +35,7 @@ def test_key_and_suffix_make_the_name_of_the_file(name) -> None:
     assert frame.name == str(Path("folder") / name)
 
 
-def test_a_file_is_read_when_it_is_told_to(labelled) -> None:
+def test_a_file_is_read_when_it_is_asked_for(labelled) -> None:
     np.testing.assert_array_equal(labelled.read().xyz, scene(50)[:, :3])
     assert labelled.read().label is None
     assert labelled.has_labels
@@ -70,7 +70,7 @@ def test_intensities_are_seen_in_another_unit_and_kept_as_they_are(labelled) -> 
         assert frame.read().intensity[0] == scene(50)[0, 3]
 
 
-def test_a_fingerprint_tells_files_apart_by_their_ends(tmp_path) -> None:
+def test_fingerprints_of_files_differ_by_their_ends(tmp_path) -> None:
     long = np.zeros(2**18, np.uint8)
     contents = {"same": long, "first": long.copy(), "last": long.copy(), "longer": np.zeros(2**19)}
     contents["first"][0] = contents["last"][-1] = 1

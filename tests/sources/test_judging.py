@@ -46,14 +46,14 @@ def test_every_frame_is_answered_for_in_its_order(method, lengths) -> None:
 def test_a_frame_that_fails_is_passed_over_and_no_window_reaches_over_it() -> None:
     frames = drive(6)
     broken = frames[2]
-    told = []
+    failed = []
 
     @contextmanager
     def guard(frame: Frame) -> Iterator[None]:
         try:
             yield
         except InputError as error:
-            told.append((frame.key, error.reason))
+            failed.append((frame.key, error.reason))
 
     class Unreadable(type(broken)):  # type: ignore[misc]
         def read(self) -> Scan:
@@ -62,6 +62,6 @@ def test_a_frame_that_fails_is_passed_over_and_no_window_reaches_over_it() -> No
     frames[2] = Unreadable(**vars(broken))
     answers = list(judgements(Between(), frames, guard))
     assert [frame.number for frame, _, _ in answers] == [0, 1, 3, 4, 5]
-    assert told == [(broken.key, "it is broken")]
+    assert failed == [(broken.key, "it is broken")]
     sure = [judgement.known is not None and judgement.known.any() for _, judgement, _ in answers]
     assert sure == [False, False, False, True, False]

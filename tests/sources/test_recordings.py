@@ -28,7 +28,7 @@ def test_a_recording_ends_where_a_frame_does_not_follow() -> None:
 
 
 @pytest.mark.parametrize(
-    ("seconds", "told"),
+    ("seconds", "parts"),
     [
         ((0.0, 0.1, 0.2, 0.3), []),
         ((None, None, None), []),
@@ -39,10 +39,10 @@ def test_a_recording_ends_where_a_frame_does_not_follow() -> None:
         ((0.0,), ["1 scan in its recording"]),
     ],
 )
-def test_what_does_not_suit_is_told(seconds, told) -> None:
+def test_what_does_not_suit_is_named(seconds, parts) -> None:
     sentences = list(irregularities(frames(*seconds), SEVERAL))
-    assert len(sentences) == len(told)
-    for sentence, part in zip(sentences, told, strict=True):
+    assert len(sentences) == len(parts)
+    for sentence, part in zip(sentences, parts, strict=True):
         assert part in sentence
 
 
@@ -77,7 +77,7 @@ def test_names_that_are_numbers_break_a_recording_where_no_times_do(
     assert [len(part) for part in unbroken_recordings(named_frames([tmp_path]))] == lengths
 
 
-def test_names_that_are_numbers_tell_the_order_where_no_times_do(tmp_path) -> None:
+def test_names_that_are_numbers_give_the_order_where_no_times_do(tmp_path) -> None:
     for number in range(4):
         scene(10).tofile(tmp_path / f"{number:03d}.bin")
     inorder = [tmp_path / f"{number:03d}.bin" for number in range(4)]
@@ -87,7 +87,7 @@ def test_names_that_are_numbers_tell_the_order_where_no_times_do(tmp_path) -> No
     assert "002.bin: not later than the scan before it (3 scans in all)" in sentence
 
 
-def test_damaged_times_are_told_and_no_more(tmp_path) -> None:
+def test_damaged_times_are_named_and_no_more(tmp_path) -> None:
     for number in range(3):
         scene(10).tofile(tmp_path / f"{number}.bin")
     (tmp_path / "times.txt").write_text("soon\n")
@@ -96,7 +96,7 @@ def test_damaged_times_are_told_and_no_more(tmp_path) -> None:
     assert "line 1 is not 1 number" in sentence
 
 
-def test_short_recordings_are_told_of_in_one_sentence() -> None:
+def test_short_recordings_are_named_in_one_sentence() -> None:
     several = [*frames(0.0), *frames(0.0, 0.1, sequence="b"), *frames(0.0, 0.1, 0.2, sequence="c")]
     (sentence,) = irregularities(several, SEVERAL)
     assert "1 scan in its recording (2 recordings are as short)" in sentence

@@ -1,4 +1,4 @@
-"""When and where scans were taken, as the files beside them say."""
+"""When and where scans were taken, from the files beside them."""
 
 import pickle
 from pathlib import Path
@@ -32,7 +32,7 @@ def records(sequence: Path) -> Records:
     return Records(sequence / "velodyne")
 
 
-def test_nothing_is_known_where_nothing_says_it(sequence) -> None:
+def test_nothing_is_known_without_a_record(sequence) -> None:
     assert records(sequence).time_of(scan(sequence)) is None
     assert records(sequence).pose_of(scan(sequence)) is None
 

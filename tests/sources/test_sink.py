@@ -72,7 +72,7 @@ def test_neither_scans_nor_labels_are_overwritten(tmp_path, out, reason) -> None
     FolderSink(tmp_path / "1/cleaned").refuse_clashes(source)
 
 
-def test_labels_that_lie_where_the_frame_says_are_not_overwritten(tmp_path) -> None:
+def test_labels_that_a_frame_names_are_not_overwritten(tmp_path) -> None:
     scan = tmp_path / "lidar/0.bin"
     write(scan)
     source = frames_of([scan], lambda scan: tmp_path / "truth/0.label", ("x", "y", "z", "i"))

@@ -57,7 +57,7 @@ def test_a_scan_is_known_by_its_content_wherever_it_lies(scans, tmp_path) -> Non
     assert training_overlap("mine", spec, CARD, scans[1:]) is None
 
 
-def test_nothing_is_said_where_nothing_is_known(scans) -> None:
+def test_nothing_is_reported_where_nothing_is_known(scans) -> None:
     assert record_of_scans([]) == record_of_sequences([]) == {}
     assert training_overlap("mine", replace(SPEC, training={}), CARD, scans) is None
 

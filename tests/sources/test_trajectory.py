@@ -1,4 +1,4 @@
-"""Poses in KITTI's and TUM's form: read, written, and told between the times that are known."""
+"""Poses in KITTI's and TUM's form: read, written, and interpolated."""
 
 import numpy as np
 import pytest
@@ -75,7 +75,7 @@ def tum(*lines: str) -> str:
     return "# time x y z qx qy qz qw\n" + "".join(f"{line}\n" for line in lines)
 
 
-def test_poses_by_time_are_told_at_their_times_and_between_them(tmp_path) -> None:
+def test_poses_by_time_are_found_at_their_times_and_between_them(tmp_path) -> None:
     half = np.sqrt(0.5)
     path = tmp_path / "drive.tum"
     path.write_text(tum("10.0 0 0 0 0 0 0 1", "", "10.5 2 4 6 0 0 -1.4142e0 1.4142e0"))
@@ -114,7 +114,7 @@ def test_times_without_a_pose_are_refused(time) -> None:
         ("# 1 2 3\n\n1 2 3\n", "line 3 is not 12 numbers"),
     ],
 )
-def test_damage_is_told_with_its_line(tmp_path, content, reason) -> None:
+def test_damage_is_named_with_its_line(tmp_path, content, reason) -> None:
     path = tmp_path / "drive.tum"
     path.write_text(content)
     with pytest.raises(InputError, match=reason):

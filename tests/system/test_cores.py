@@ -88,7 +88,7 @@ def test_threads_are_a_whole_number_and_none_are_one_for_each_core() -> None:
 
 
 @pytest.mark.parametrize(("user", "inside"), [(None, "passive"), ("active", "active")])
-def test_what_is_imported_inside_is_told_to_sleep_unless_the_user_has_said_otherwise(
+def test_what_is_imported_inside_is_set_to_sleep_unless_the_user_has_set_it(
     monkeypatch, user, inside
 ) -> None:
     monkeypatch.delenv(WAIT_POLICY, raising=False)

@@ -1,4 +1,4 @@
-"""What an extra brings is said in one line wherever it is missing."""
+"""A missing extra is named in one line wherever it is needed."""
 
 import importlib.metadata
 import pickle
@@ -33,7 +33,7 @@ def nothing_installed(monkeypatch) -> None:
         monkeypatch.setitem(sys.modules, extra.library, None)
 
 
-def test_a_library_is_in_the_extra_that_is_said_to_bring_it() -> None:
+def test_a_library_is_in_the_extra_that_is_named_for_it() -> None:
     distributions = importlib.metadata.packages_distributions()
     for extra in EXTRAS:
         providers = {each.lower() for each in distributions.get(extra.library, [extra.library])}
@@ -95,7 +95,7 @@ def test_a_library_that_is_there_and_broken_is_not_called_missing(tmp_path, monk
     assert not isinstance(refusal.value, MissingExtraError)
 
 
-def test_an_import_that_failed_is_told_if_an_extra_would_mend_it(request) -> None:
+def test_an_import_that_failed_names_the_extra_that_would_mend_it(request) -> None:
     of_a_part = ModuleNotFoundError("no", name="matplotlib.nothing")
     assert missing_extra("view", of_a_part) is None  # the library itself is installed
     request.getfixturevalue("nothing_installed")

@@ -1,4 +1,4 @@
-"""A process keeps what it frees, if it is told to."""
+"""A process keeps what it frees, if it is set to."""
 
 import platform
 import subprocess

@@ -1,10 +1,10 @@
-"""What is odd about scans is told once for each kind, and counted."""
+"""What is odd about scans is printed once for each kind, and counted."""
 
 from derain.system.notices import Notices
 from derain.views.scan_issues import ScanIssue
 
 
-def test_each_kind_is_told_with_its_first_scan_and_counted(capsys) -> None:
+def test_each_kind_is_printed_with_its_first_scan_and_counted(capsys) -> None:
     notices = Notices()
     none, unit = ScanIssue("no intensity", "no intensity here"), ScanIssue("another unit", "0..1")
     notices.warn("a", [none])

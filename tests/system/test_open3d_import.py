@@ -1,4 +1,4 @@
-"""Open3D is imported, or the user is told what is missing; and TensorBoard starts beside it."""
+"""Open3D is imported, or an error names what is missing; and TensorBoard starts beside it."""
 
 import errno
 import os
@@ -100,7 +100,7 @@ def test_tensorboard_loads_its_plug_ins_once_the_link_is_made() -> None:
     assert "Open3DPlugin" in finished.stdout
 
 
-def test_without_open3d_a_training_on_worlds_says_what_to_install_and_leaves_nothing(
+def test_without_open3d_a_training_on_worlds_names_what_to_install_and_leaves_nothing(
     run_derain, tmp_path, monkeypatch
 ) -> None:
     monkeypatch.chdir(tmp_path)

@@ -44,8 +44,8 @@ if "LOCAL_RANK" in os.environ:
     exit_with_launcher()
     print("at work", flush=True)
     time.sleep(600)
-told = {"LOCAL_RANK": "0", "TORCHELASTIC_RUN_ID": "none"}
-subprocess.run([sys.executable, __file__], env={**os.environ, **told})
+given = {"LOCAL_RANK": "0", "TORCHELASTIC_RUN_ID": "none"}
+subprocess.run([sys.executable, __file__], env={**os.environ, **given})
 """
 
 

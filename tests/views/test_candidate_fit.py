@@ -64,7 +64,7 @@ def test_little_rain_makes_the_bounds_wider_than_its_outermost_drops(points) -> 
     assert np.mean(outside) < 0.002
 
 
-def test_of_fewer_drops_than_tell_a_tail_nothing_follows() -> None:
+def test_too_few_drops_to_show_a_tail_give_no_bound() -> None:
     scan, _ = street(5000, 9)
     nine = np.arange(5000) < 9
     assert fit_candidates([(scan, nine)], CHANNELS) is None

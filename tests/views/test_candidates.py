@@ -56,7 +56,7 @@ def test_candidates_are_what_no_bound_leaves_out(candidates, seed, intensity) ->
 
 
 @given(rules)
-def test_candidates_survive_json_and_say_each_of_their_numbers(candidates) -> None:
+def test_candidates_survive_json_and_print_each_of_their_numbers(candidates) -> None:
     content = [{"channel": b.channel, "least": b.least, "most": b.most} for b in candidates.bounds]
     document = {"bounds": content, "points": 0.25, "rain": 0.5, "rain_share": 0.75}
     assert candidates_at(Entry("model", "", json.loads(json.dumps(document)))) == candidates

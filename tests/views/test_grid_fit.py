@@ -146,7 +146,7 @@ def organised(inclination: NDArray[np.float64], blur: float) -> Scan:
 
 
 @pytest.mark.parametrize("descending", [True, False])
-def test_rows_of_an_organised_scan_are_beams_where_inclination_tells_them(descending) -> None:
+def test_rows_of_an_organised_scan_are_beams_where_inclination_separates_them(descending) -> None:
     # Beams that touch: by inclination alone there is one cluster.
     beams = np.cumsum(np.linspace(1, 0.2, 30)) - 12
     scan = organised(beams[::-1] if descending else beams, blur=0.1)

@@ -1,4 +1,4 @@
-"""Ranks of intensity keep its order, whatever its unit, and tell rare ones apart."""
+"""Ranks of intensity keep its order, whatever its unit, and separate rare ones."""
 
 import numpy as np
 from hypothesis import given
@@ -35,7 +35,7 @@ def test_as_many_levels_as_ranks_have_one_each() -> None:
     np.testing.assert_array_equal(rank, level)
 
 
-def test_intensities_are_told_apart_where_most_points_share_one() -> None:
+def test_intensities_are_separated_where_most_points_share_one() -> None:
     intensity = np.repeat(np.arange(20, dtype=np.float32), [8000] + [100] * 19)
     rank = intensity_rank(of_intensities(intensity, len(intensity)))
     assert len(np.unique(rank)) > 12

@@ -1,4 +1,4 @@
-"""Scans that are not what one sensor sees in metres are told of, and no others."""
+"""Scans that are not what one sensor sees in metres are warned of, and no others."""
 
 from functools import cache
 
@@ -257,7 +257,7 @@ def test_a_scan_without_a_point_is_not_odd(points) -> None:
     assert kinds(points) == []
 
 
-def test_every_oddity_says_what_can_be_done(spinning) -> None:
+def test_every_warning_names_a_remedy(spinning) -> None:
     remedies = {
         "divide millimetres": spinning * 1000,
         "neither in kilometres": spinning / 1000,
@@ -273,7 +273,7 @@ def test_every_oddity_says_what_can_be_done(spinning) -> None:
 
 
 @pytest.mark.parametrize("method", ["network", "filter"])
-def test_networks_and_filters_say_it(spinning, method) -> None:
+def test_networks_and_filters_warn_of_it(spinning, method) -> None:
     scan = Scan.of(np.column_stack([spinning * 1000, np.resize(np.arange(90.0), len(spinning))]))
     if method == "network":
         found = OutDet().spec_for(load_card("wads")).issues(scan)

@@ -1,4 +1,4 @@
-"""What a file's columns say of returns counts, and agrees with what directions say."""
+"""Returns are read from a file's columns, which agree with directions."""
 
 from typing import Any
 
@@ -64,7 +64,7 @@ STATED = [of_las, of_las_bits, of_old_las_bits, of_nebula, of_autoware, of_livox
 
 
 @pytest.mark.parametrize("columns", STATED)
-def test_what_the_file_says_is_what_directions_say(columns) -> None:
+def test_the_columns_of_a_file_agree_with_directions(columns) -> None:
     recording = Recording(1)
     scan = with_columns(recording, **columns(recording))
     by_directions = pair_returns(Scan.of(recording.xyz))
@@ -88,7 +88,7 @@ def test_a_return_whose_partner_is_not_in_the_file_is_known_by_its_column(column
     np.testing.assert_array_equal(returns.nearer, nearer[kept] & knows_of_more)
 
 
-def test_what_the_file_says_counts_more_than_directions() -> None:
+def test_the_columns_of_a_file_go_before_directions() -> None:
     recording = Recording(3)
     partner, _, _ = recording.truth()
     columns = of_las(recording)
@@ -127,7 +127,7 @@ def test_a_column_that_counts_inwards_is_taken_the_other_way_round() -> None:
         {"range": np.zeros(10), "range2": np.ones(10)},
     ],
 )
-def test_a_column_that_tells_nothing_counts_for_nothing(column) -> None:
+def test_a_column_without_information_is_ignored(column) -> None:
     scan = Scan(np.random.default_rng(0).normal(5, 1, (10, 3)).astype(np.float32), fields=column)
     assert stated_returns(scan) is None
     returns = pair_returns(scan)
@@ -167,10 +167,10 @@ def test_ousters_second_returns_lie_behind_the_first_or_in_front(shared) -> None
     np.testing.assert_allclose(returns.partner_range[both], second[both] / 1000, rtol=0.02)
 
 
-def test_the_types_of_the_velodyne_file_are_told_by_its_geometry(shared) -> None:
+def test_the_types_of_the_velodyne_file_follow_from_its_geometry(shared) -> None:
     scan = read_scan(shared / "data" / "clean" / "velodyne_vlp16_dual.pcd")
     returns = pair_returns(scan)
-    # Of its driver, "last" is the nearer of two: all that lie in one direction say so.
+    # Of its driver, "last" is the nearer of two: all that lie in one direction show it.
     np.testing.assert_array_equal(returns.nearer, np.isin(scan.fields["return_type"], (5, 10)))
     paired = np.flatnonzero(returns.partner >= 0)
     nearer = scan.range[returns.partner[paired]] > scan.range[paired]

@@ -82,7 +82,7 @@ def test_the_order_of_the_rows_does_not_matter(seed) -> None:
     np.testing.assert_array_equal(shuffled.farther, plain.farther[order])
 
 
-def test_rows_written_twice_are_one_return_each_of_which_is_told_the_same() -> None:
+def test_rows_written_twice_are_one_return_and_have_the_same_role() -> None:
     recording = Recording(0)
     plain = pair_returns(Scan.of(recording.xyz))
     doubled = pair_returns(Scan.of(np.concatenate([recording.xyz, recording.xyz])))

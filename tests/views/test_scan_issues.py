@@ -77,7 +77,7 @@ def test_every_channel_that_is_missing_is_an_oddity_of_its_own(spec) -> None:
 
 
 @pytest.mark.parametrize(("full_scale", "unit"), [(1.0, "smaller"), (65_535.0, "larger")])
-def test_intensities_of_another_unit_are_told_from_those_of_a_bright_scene(
+def test_intensities_of_another_unit_are_distinguished_from_a_bright_scene(
     spec, full_scale, unit
 ) -> None:
     # Bright enough for the means to be no farther apart than those of two scenes may be.
@@ -104,7 +104,7 @@ def test_real_scans_are_odd_only_where_their_intensities_are_shares(spec, shared
         assert {name: kinds(scan, checker) for name, scan in scans.items()} == units
 
 
-def test_a_unit_that_is_not_stated_is_told_by_the_mean_alone(spec) -> None:
+def test_a_unit_that_is_not_stated_is_recognised_by_the_mean_alone(spec) -> None:
     unknown = replace(spec, units=("m", "m", "m", "not stated"))
     assert kinds(with_intensity(scene(300)[:, 3] / 255), unknown) == ["intensity of a smaller unit"]
     assert kinds(with_intensity(scene(300)[:, 3] * 2), unknown) == []
@@ -132,7 +132,7 @@ def test_more_than_twice_the_heaviest_rain_is_too_much() -> None:
     assert issue.detail.startswith("36% of the points are called rain")
 
 
-def test_any_header_may_say_that_parts_of_its_file_are_not_written() -> None:
+def test_any_header_may_state_that_parts_of_its_file_are_not_written() -> None:
     @dataclass(frozen=True)
     class Header:
         left_out: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""A view is found by its name, says its own part of a Spec, and may see a window of scans."""
+"""A view is found by its name, writes its own part of a Spec, and may see a window of scans."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -33,7 +33,7 @@ def test_derain_has_these_views_and_each_knows_its_name() -> None:
 
 
 @pytest.mark.parametrize("view", OURS.values(), ids=OURS.keys())
-def test_a_view_reads_back_what_it_says_of_itself(view) -> None:
+def test_a_view_reads_back_what_it_writes(view) -> None:
     channels, fill_value = ("z", "range"), {"z": 1.5}
     entry = Entry("model", "view", view.as_dict())
     assert entry.value["kind"] == view.NAME

@@ -37,13 +37,13 @@ def test_worse_visibility_never_has_a_lower_level(pairs, hold) -> None:
 @given(ranges, st.lists(st.booleans(), min_size=40, max_size=40), holds)
 def test_scans_of_which_nothing_is_known_change_nothing(metres, gaps, hold) -> None:
     without = levels(Alarm(hold=hold), *map(seen, metres))
-    alarm, told = Alarm(hold=hold), []
+    alarm, found = Alarm(hold=hold), []
     for each, gap in zip(metres, gaps, strict=False):
         if gap:
             before = alarm.level
             assert alarm.update(NOT_KNOWN) == before
-        told.append(alarm.update(seen(each)))
-    assert told == without
+        found.append(alarm.update(seen(each)))
+    assert found == without
 
 
 @given(ranges, st.floats(0, 80), holds)
@@ -51,15 +51,15 @@ def test_what_stays_long_enough_decides_whatever_was_before(metres, last, hold) 
     if 15 <= last < 20 or 30 <= last < 40:  # it may stay as it was
         return
     alarm = Alarm(hold=hold)
-    told = levels(alarm, *map(seen, metres), *[seen(last)] * hold)
-    assert told[-1] == (last < 15) + (last < 30)
+    found = levels(alarm, *map(seen, metres), *[seen(last)] * hold)
+    assert found[-1] == (last < 15) + (last < 30)
 
 
 def test_a_level_waits_for_so_many_scans_in_a_row_and_stays_within_the_gap() -> None:
     alarm = Alarm(hold=3)
     far, near, gap = seen(100), seen(25), seen(35)
-    told = levels(alarm, far, near, near, far, near, near, near, far, far, gap, far, far, far)
-    assert "".join(str(level)[0] for level in told) == "ccccccwwwwwwc"
+    found = levels(alarm, far, near, near, far, near, near, near, far, far, gap, far, far, far)
+    assert "".join(str(level)[0] for level in found) == "ccccccwwwwwwc"
     assert levels(alarm, gap, gap, gap) == [Level.CLEAR] * 3
 
 

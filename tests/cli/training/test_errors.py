@@ -9,7 +9,7 @@ FIT = ("fit", "--config", "outdet_simulated.yaml")
 
 
 @pytest.mark.parametrize(
-    ("option", "value", "said"),
+    ("option", "value", "message"),
     [
         (
             "--trainer.max_epoch",
@@ -29,13 +29,13 @@ FIT = ("fit", "--config", "outdet_simulated.yaml")
         ("--trainer.max_epochs", "-3", "--trainer: `max_epochs` must be"),
     ],
 )
-def test_an_option_is_refused_in_a_line(last_line, option, value, said) -> None:
-    assert said in last_line(*FIT, f"{option}={value}")
+def test_an_option_is_refused_in_a_line(last_line, option, value, message) -> None:
+    assert message in last_line(*FIT, f"{option}={value}")
     assert not Path("runs").exists()
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("content", "message"),
     [
         (SIMULATED % "{loading: {kept_megabytes: 1}}", "Did you mean data.loading.cache_mb?"),
         (SIMULATED % "{campaign: {scans: many}}", "data.campaign.scans: cannot be many. Give: int"),
@@ -45,7 +45,7 @@ def test_an_option_is_refused_in_a_line(last_line, option, value, said) -> None:
         ("trainer: " + 100 * "[", "mine.yaml: cannot be read as .yaml (nested more than"),
     ],
 )
-def test_a_configuration_is_refused_in_a_line(last_line, content, said) -> None:
+def test_a_configuration_is_refused_in_a_line(last_line, content, message) -> None:
     Path("mine.yaml").write_text(content)
-    assert said in last_line(*FIT, "--config", "mine.yaml")
+    assert message in last_line(*FIT, "--config", "mine.yaml")
     assert not Path("runs").exists()

@@ -21,7 +21,7 @@ def test_intervals_agree_with_drawing_scans_one_by_one(monkeypatch) -> None:
     np.testing.assert_allclose(behind_best, np.percentile(behind, [2.5, 97.5], axis=1).T, atol=0.01)
 
 
-def test_a_method_that_is_worse_on_every_scan_is_told_apart_though_scans_differ_more() -> None:
+def test_a_method_that_is_worse_on_every_scan_is_recognised_though_scans_differ_more() -> None:
     found = np.array([[90, 50, 10, 70, 30, 20], [88, 48, 8, 68, 28, 18]])
     intervals, behind_best = bootstrap(found, 100 - found, generator(0))
     (low, high), _ = intervals

@@ -115,7 +115,7 @@ def test_inputs_that_a_network_has_no_use_for_may_be_among_those_of_its_view(tmp
     np.testing.assert_allclose(other.logits(view), usual.logits(view), rtol=1e-5, atol=1e-4)
 
 
-def test_a_processor_without_bfloat16_is_told(monkeypatch) -> None:
+def test_a_processor_without_bfloat16_is_warned_of(monkeypatch) -> None:
     # OpenVINO's own way to make little of a processor; read when it is loaded.
     monkeypatch.setenv("OV_CPU_MAX_ISA", "AVX2")
     code = "import sys; from derain.cli.main import main; sys.exit(main(sys.argv[1:]))"

@@ -80,7 +80,7 @@ def test_a_column_that_would_lose_digits_is_not_written(file) -> None:
 
 @pytest.mark.parametrize("columns", [("z", "y", "x", "intensity"), FIVE, SIX], ids=len)
 @pytest.mark.parametrize("origin", [np.float32, np.float64])
-def test_float64_is_told_from_float32_and_written_back(file, columns, origin) -> None:
+def test_float64_is_recognised_and_written_back(file, columns, origin) -> None:
     # What was float32 before has 29 bits of zeros behind each number.
     rows = (street(2000, len(columns)).astype(np.float64) * np.pi).astype(origin).astype("<f8")
     file.write_bytes(rows.tobytes())

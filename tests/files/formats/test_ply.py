@@ -196,7 +196,7 @@ def test_faces_follow_vertices_in_any_order_and_the_first_of_those_taken_twice(t
     ("faces", "cut"),
     [([*TRIANGLES, (0, 1, 2, 3)], 0), ([(0, 1, 6)], 0), ([(0, 1, -1)], 0), (TRIANGLES, 12)],
 )
-def test_faces_that_cannot_follow_are_left_out_and_said_to_be(
+def test_faces_that_cannot_follow_are_left_out_with_a_warning(
     tmp_path, encoding, faces, cut
 ) -> None:
     path = tmp_path / "mesh.ply"

@@ -155,16 +155,18 @@ def test_a_run_that_was_moved_goes_on_with_its_best(fit, tmp_path) -> None:
     assert weights(tmp_path / "second") == {"best.ckpt": 1}
 
 
-def test_a_run_whose_best_is_gone_starts_anew_and_says_so(fit, tmp_path, capsys) -> None:
+def test_a_run_whose_best_is_gone_starts_anew_with_a_warning(fit, tmp_path, capsys) -> None:
     scores = (3.0, 2.0, 1.0)
     gone = Path(fit("first", 1, scores, mode="max").best_model_path)
     gone.unlink()
     resumed = fit("second", 3, scores, earlier="first", mode="max")
     assert weights(tmp_path / "second") == {"best.ckpt": 2}
     assert resumed.best_model_score == 2
-    said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("derain: ")]
-    assert len(said) == 1
-    assert said[0].startswith(f"derain: warning: {gone}: not found; the best checkpoint is chosen")
+    printed = [line for line in capsys.readouterr().err.splitlines() if line.startswith("derain: ")]
+    assert len(printed) == 1
+    assert printed[0].startswith(
+        f"derain: warning: {gone}: not found; the best checkpoint is chosen"
+    )
 
 
 @pytest.mark.parametrize("first", [True, False])
@@ -172,12 +174,12 @@ def test_only_the_first_process_copies(fit, tmp_path, first) -> None:
     state = fit("first", 1, (3.0,), mode="max").state_dict()
     best = BestCheckpoint(tmp_path / "second", filename="best", monitor="score", mode="max")
     best.load_state_dict(state)
-    told = SimpleNamespace(broadcast=lambda _: True)
+    strategy = SimpleNamespace(broadcast=lambda _: True)
     trainer = SimpleNamespace(
         is_global_zero=first,
         ckpt_path=tmp_path / "first/last.ckpt",
         fast_dev_run=False,
-        strategy=told,
+        strategy=strategy,
     )
     best.on_train_start(trainer, None)
     assert (tmp_path / "second/best.ckpt").exists() == first

@@ -1,4 +1,4 @@
-"""What a step's time is said to be spent on, by a clock that moves when it is told to."""
+"""What a step's time is spent on, by a clock that the test moves."""
 
 import time
 from types import SimpleNamespace
@@ -15,7 +15,7 @@ MODEL: Any = SimpleNamespace(device=torch.device("cpu"))
 
 
 class Training:
-    """A training of steps that take as long as they are told to, logged every few steps."""
+    """A training of steps that take the given times, logged every few steps."""
 
     def __init__(self, every: int) -> None:
         self.now = 100.0
@@ -77,7 +77,7 @@ def test_neither_validation_nor_what_lies_between_epochs_is_waited_for(training)
     assert training.logged == [(3, spent(read=0, view=0, wait=500, network=1000, speed=2 / 3))]
 
 
-def test_a_training_that_logs_no_steps_says_it_at_its_end(monkeypatch) -> None:
+def test_a_training_that_logs_no_steps_prints_its_times_at_its_end(monkeypatch) -> None:
     training = Training(every=0)
     monkeypatch.setattr(time, "perf_counter", lambda: training.now)
     training.times.on_train_start()

@@ -35,7 +35,7 @@ from derain.views.spherical_grid import grid_of
 WADS = load_card("wads")
 PUBLISHED = SelectionRule(residual=0.008, ground=-1.8, intensity=2 / 255, near=2.5)
 
-# Calls so much of a scene rain that its IoU says something.
+# Calls so much of a scene rain that its IoU means something.
 LENIENT = {"residual": 1e-6, "ground": -10.0, "intensity": 1.0}
 
 
@@ -44,7 +44,7 @@ def published(network: LiSnowNetwork) -> dict[str, Tensor]:
     return {published_key(name): tensor for name, tensor in network.state_dict().items()}
 
 
-def test_the_spec_says_how_the_network_is_used() -> None:
+def test_the_spec_holds_how_the_network_is_used() -> None:
     model = LiSnowNet(grid="wads", rule={"residual": 0.008, "near": 2.5}, threshold=0.25)
     spec = model.spec_for(WADS)
     assert (spec.network, spec.threshold) == ("lisnownet", 0.25)
@@ -73,7 +73,7 @@ def test_the_network_sees_cube_roots(distance, intensity, full_scale, seen) -> N
     np.testing.assert_allclose(roots.flatten(), seen, rtol=1e-6)
 
 
-def says_snow(
+def snow_as_published(
     image: NDArray[np.float64], change: NDArray[np.float64], rule: SelectionRule
 ) -> NDArray[np.bool_]:
     """The published rule, word for word (Source: M.-Y. Yu et al., IROS 2022)."""
@@ -90,7 +90,7 @@ def says_snow(
     [PUBLISHED, SelectionRule(), SelectionRule(0.012, -0.5, 0.3, 1.0, 1.0)],
     ids=["published", "default", "share"],
 )
-def test_a_probability_above_one_half_is_what_the_published_rule_says(rule) -> None:
+def test_a_probability_above_one_half_is_snow_by_the_published_rule(rule) -> None:
     rng = np.random.default_rng(0)
     size = (40, 50)
     intensity = rng.choice([0.0, 1.0, 2.0, 3.0, 200.0], size) / 255 * rule.full_scale
@@ -102,7 +102,7 @@ def test_a_probability_above_one_half_is_what_the_published_rule_says(rule) -> N
     logits = rain_logits(torch.from_numpy(image)[None], returned, seen, denoised, rule)
     probability = probability_of_rain(logits.numpy()).reshape(size)
     change = (denoised - seen)[0].numpy()
-    snow = says_snow(image.astype(np.float64), change.astype(np.float64), rule)
+    snow = snow_as_published(image.astype(np.float64), change.astype(np.float64), rule)
     snow &= returned.numpy()[0, 0]
     assert 0.05 < snow.mean() < 0.95
     np.testing.assert_array_equal(probability > 0.5, snow)
@@ -132,7 +132,7 @@ def test_the_model_applies_its_rule_to_what_the_network_changed(
     share = np.clip(image[2] / 255, 0, 1)
     seen = torch.from_numpy(np.cbrt([image[0], share]).astype(np.float32))[None]
     change = (model.network(seen, inputs["valid"]) - seen)[0].double().numpy()
-    snow = says_snow(image, change, model.selection)
+    snow = snow_as_published(image, change, model.selection)
     valid = one.view.valid
     assert 0.05 < snow[valid].mean() < 0.95
     probability = probability_of_rain(model(**inputs).numpy()).reshape(18, 60)
@@ -174,7 +174,7 @@ def test_published_weights_are_taken_over(image_network, image_sample, prefix) -
     inputs = Batch.of([image_sample(own, scene())]).inputs
     seen = cube_roots(inputs["image"], SelectionRule(full_scale=255.0))
     assert torch.equal(model.network(seen, inputs["valid"]), own.network(seen, inputs["valid"]))
-    # The rule is not in the weights: what no scan says is as it is by default.
+    # The rule is not in the weights: its constants are those of the default.
     assert model.selection == SelectionRule()
 
 

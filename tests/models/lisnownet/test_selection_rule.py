@@ -78,7 +78,7 @@ def test_the_full_scale_is_the_smallest_that_no_intensity_exceeds(intensities, f
     assert SelectionRule.fitted({}, scans).full_scale == full_scale
 
 
-def test_what_is_not_measured_says_nothing_of_the_full_scale() -> None:
+def test_what_is_not_measured_does_not_change_the_full_scale() -> None:
     damaged = Scan.of(np.array([[5, 0, -1, 0.5], [np.nan, 0, 0, 900], [0, 0, 0, 900.0]]))
     assert SelectionRule.fitted({}, [damaged]).full_scale == 1.0
     without = Scan.of(scene()[:, :3])

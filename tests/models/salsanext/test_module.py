@@ -33,7 +33,7 @@ def published(network: SalsaNextNetwork) -> dict[str, Tensor]:
     return {PUBLISHED_KEYS[name]: tensor for name, tensor in network.state_dict().items()}
 
 
-def test_the_spec_says_how_the_network_is_used() -> None:
+def test_the_spec_holds_how_the_network_is_used() -> None:
     spec = SalsaNext(grid="wads", threshold=0.25).spec_for(WADS)
     assert (spec.network, spec.threshold) == ("salsanext", 0.25)
     assert spec.channels == ("range", "x", "y", "z", "intensity")
@@ -82,7 +82,7 @@ def test_weights_need_a_grid_and_a_card_with_statistics_of_range(image_network) 
         ({"channels": 4}, "2 classes and 4 channels"),
     ],
 )
-def test_weights_that_do_not_tell_rain_are_refused(size, reason) -> None:
+def test_weights_of_other_classes_or_channels_are_refused(size, reason) -> None:
     weights = published(SalsaNextNetwork(width=4, **size))
     with pytest.raises(InputError, match=reason):
         SalsaNext.from_published(weights, WADS, "wads")
