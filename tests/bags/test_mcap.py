@@ -77,7 +77,6 @@ def all_of(file: BinaryIO) -> list[tuple[Any, ...]]:
     found: list[tuple[Any, ...]] = []
     for schema, channel, each in make_reader(file, validate_crcs=True).iter_messages():
         data = b"" if channel.topic == POINTS else each.data
-        assert schema is not None
         found.append((each.log_time, each.publish_time, each.sequence, data, channel.topic))
         found.append((channel.message_encoding, channel.metadata, schema.name, schema.data))
     for each in (NonSeekingReader.iter_attachments, NonSeekingReader.iter_metadata):

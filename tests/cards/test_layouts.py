@@ -36,11 +36,9 @@ def test_layouts_that_identify_a_card_go_first_and_folders_of_the_lidar_before_m
 
 def test_folders_identify_no_more_than_their_card_allows() -> None:
     by_folders = card_by_folders(REHEARSE3D, "rain")
-    assert by_folders is not None
     assert by_folders.name == "REHEARSE-3D"
     assert card_by_folders(Layout(), "rain") is None
     of_velodyne = card_by_folders(Layout(), "classes")
-    assert of_velodyne is not None
     assert of_velodyne.name == "WADS"
 
 

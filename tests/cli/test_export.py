@@ -57,7 +57,6 @@ def test_candidates_are_fitted_to_labelled_scans_and_their_cost_is_printed(
     outcome = succeed("export", checkpoint, "--out", out, *options, "--repeats", "1")
     derainer, of_all = Derainer(out, 1), Derainer(onnx_model, 1)
     candidates = derainer.spec.candidates
-    assert candidates is not None
     assert f"Candidates: {candidates}, " in outcome.out
     assert "% of that which the network finds\nIoU on these 2 scans 0." in outcome.out
     for scan in map(read_scan, few):

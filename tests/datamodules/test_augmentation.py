@@ -63,7 +63,6 @@ def test_a_mirror_changes_left_and_right_and_nothing_else() -> None:
 def test_points_that_are_left_keep_their_order_and_what_belongs_to_them(seed) -> None:
     scan = street()
     left = DROP(scan, np.random.default_rng(seed))
-    assert left.label is not None
     assert (np.diff(left.label) > 0).all()  # a point's label is its row
     np.testing.assert_array_equal(left.xyz, scan.xyz[left.label])
     np.testing.assert_array_equal(left.intensity, scan.intensity[left.label])
@@ -117,7 +116,6 @@ def test_points_that_cannot_be_judged_stay_as_they_are(scan) -> None:
 def test_a_sector_is_all_that_there_is_between_two_azimuths(seed) -> None:
     scan = Scan.of(scene(500)).with_label(np.arange(500))
     kept = SECTOR(scan, np.random.default_rng(seed))
-    assert kept.label is not None
     rows = kept.label
     np.testing.assert_array_equal(kept.xyz, scan.xyz[rows])
     left = np.setdiff1d(np.arange(len(scan)), rows)

@@ -47,11 +47,10 @@ def test_what_came_first_stays_as_long_as_it_fits() -> None:
 
 
 def epochs(data: Folder, part: Part, loading: Loading) -> Iterator[Batch]:
-    assert data.task is not None
     loader = scan_loader(data.source(part), part, data.task, loading)
     for epoch in range(3):
-        loader.sampler.set_epoch(epoch)  # type: ignore[attr-defined]
-        yield from loader  # type: ignore[misc]
+        loader.sampler.set_epoch(epoch)
+        yield from loader
 
 
 @pytest.mark.parametrize("augmentation", [NOTHING, EVERYTHING], ids=["still", "changed"])
@@ -63,7 +62,6 @@ def test_keeping_changes_no_batch(folder, connect, part, augmentation, workers) 
     for one, other in zip(kept, anew, strict=True):
         for name, tensor in other.inputs.items():
             assert torch.equal(one.inputs[name], tensor)
-        assert one.target is not None
         assert torch.equal(one.target, other.target)
         assert [m.key for m in one.measured] == [m.key for m in other.measured]
 

@@ -151,7 +151,6 @@ def test_the_record_holds_the_scans_of_all_parts(tmp_path, write) -> None:
     assert len(spec.training["scans"]) == 7 - 2  # the three files hold the same points
     for source, card in ((files.source("train"), files.card), (part(SNOW).source("train"), SNOW)):
         overlap = training_overlap("model", spec, card, source)
-        assert overlap is not None
         assert f"on {len(source)} of these {len(source)} scans" in overlap
     others = Frames.of_scans(scans(2, [0], 90))
     assert training_overlap("model", spec, SNOW, others) is None

@@ -45,7 +45,6 @@ def drives(*lengths: int) -> Frames:
 
 
 def which(scan: Scan) -> int:
-    assert scan.intensity is not None
     return int(scan.intensity[0])
 
 

@@ -159,13 +159,11 @@ def test_a_frame_is_answered_at_once_as_if_it_were_judged_alone(derainer) -> Non
     scan, stopwatch = Scan.of(scene(POINTS)), Stopwatch()
     frame = MemoryFrame(key="0", scan=scan)
     judgement = derainer.push(frame, stopwatch)
-    assert judgement is not None
     assert judgement.frame is frame
     assert list(stopwatch.milliseconds) == ["read", "view", "network", "back"]
     assert (derainer.waiting, derainer.starts_new_recording(frame)) == (0, False)
     for points in (scan, scene(POINTS)):
         of_points = derainer.push(points)
-        assert of_points is not None
         assert of_points.frame is None
         np.testing.assert_array_equal(of_points.probability, judgement.probability)
     assert list(derainer.flush()) == []
@@ -191,7 +189,6 @@ def windowed(onnx_model, monkeypatch) -> Iterator[Derainer]:
 
 
 def assert_seen(judgement: Judgement | None, derainer: Derainer, before: int, after: int) -> None:
-    assert judgement is not None
     expected = derainer.probability(as_seen(judgement.scan, before, after))
     np.testing.assert_array_equal(judgement.probability, expected)
     other = derainer.probability(as_seen(judgement.scan, before + 1, after))

@@ -101,7 +101,6 @@ class Crowded(InMemoryStorage):
         other, self.other = self.other, None
         if other is not None:
             trial = other.next(9)
-            assert trial is not None
             other.finish(trial, value_of(trial))
             self.other = other
         return super().create_new_trial(study_id, template_trial)

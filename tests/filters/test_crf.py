@@ -150,7 +150,6 @@ def test_the_published_variant_follows_its_formulas(seed, points, neighbours, si
 def test_the_fitted_variant_does_the_same_within_its_own_bounds(seed) -> None:
     scan = Scan.of(scene(1200, seed))
     ground = find_ground(scan.xyz)
-    assert ground is not None
     reference = Reference(scene(1200, seed), 8)
 
     def around(rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
@@ -160,7 +159,6 @@ def test_the_fitted_variant_does_the_same_within_its_own_bounds(seed) -> None:
     bounds = fit_rain_bounds(
         reference.xyz, reference.range, reference.intensity, above, around, 3.0, 2.0
     )
-    assert bounds is not None
     assert not bounds.is_bright
     assert 3 < bounds.intensity < 6  # drops have 0 to 4, the wall at least 20
     candidate = above & bounds.hold(reference.intensity, reference.range)

@@ -37,7 +37,6 @@ def test_the_plane_of_a_road_is_found_whatever_stands_on_it(slope_x, slope_y, of
     plane = road(slope_x, slope_y, offset, generator)
     scene = np.concatenate([plane, clutter(generator) + up * (offset + 1.8)])
     ground = find_ground(generator.permutation(scene))
-    assert ground is not None
     np.testing.assert_allclose(
         [ground.slope_x, ground.slope_y, ground.offset], [slope_x, slope_y, offset], atol=0.03
     )
@@ -48,7 +47,6 @@ def test_the_plane_of_a_road_is_found_whatever_stands_on_it(slope_x, slope_y, of
 def test_a_plane_alone_is_found_exactly() -> None:
     x, y = (axis.ravel().astype(np.float64) for axis in np.mgrid[-20:21, -20:21])
     ground = find_ground(np.stack([x, y, 0.05 * x - 0.1 * y - 2], axis=1))
-    assert ground is not None
     found = (ground.slope_x, ground.slope_y, ground.offset)
     np.testing.assert_allclose(found, (0.05, -0.1, -2), atol=1e-9)
 

@@ -61,7 +61,6 @@ def test_tasks_that_are_run_again_do_the_shards_that_the_job_was_begun_in() -> N
         "SLURM_ARRAY_TASK_MAX": "20",
     }
     task = Shard.of_environment(environment)
-    assert task is not None
     assert task.within((100, 1)) == Shard(16, 100, first=1, of_array=True)
     with pytest.raises(InputError, match="no shard 17: the 10 shards are 0 to 9"):
         task.within((10, 0))

@@ -34,7 +34,6 @@ def test_a_batch_is_its_scans_one_after_the_other() -> None:
     assert batch.cells == list(SIZES)
     assert list(batch.inputs) == ["points", "distances", "neighbours"]
     inputs = [batch.split(tensor) for tensor in batch.inputs.values()]
-    assert batch.target is not None
     for own, points, distances, neighbours, target in zip(
         SAMPLES, *inputs, batch.split(batch.target), strict=True
     ):
@@ -67,7 +66,6 @@ def test_cells_of_unknown_points_are_not_to_be_judged(view) -> None:
     scan = Scan.of(scene(200)).with_label(rng.choice([0, 3, 9], 200))
     viewed = view(scan)
     target = Sample.of(scan, viewed, card).target
-    assert target is not None
     assert Sample.of(scan.with_label(None), viewed, card).target is None
     # Rows as cells see them: the first of those at one position, the nearest in a pixel.
     row = viewed.first if isinstance(viewed, Neighbourhoods) else viewed.winner
@@ -100,7 +98,6 @@ def test_only_a_batch_that_is_measured_carries_its_scans(view, measured) -> None
 def test_tensors_follow_to_another_device_and_scans_stay() -> None:
     batch = Batch.of(SAMPLES)
     moved = batch.to(torch.device("meta"))
-    assert moved.target is not None
     assert {tensor.device.type for tensor in [*moved.inputs.values(), moved.target]} == {"meta"}
     assert moved.cells == batch.cells
     assert moved.measured is batch.measured

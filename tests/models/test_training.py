@@ -168,7 +168,6 @@ def test_a_network_of_candidates_learns_from_them_and_judges_them_alone(
     model = OutDet(candidates=0.9)
     trainer.fit(model, data)
     candidates = model.spec.candidates
-    assert candidates is not None
     assert {bound.channel for bound in candidates.bounds} <= {"range", "z", "intensity"}
     shares = [1 - candidates.rain_share, candidates.rain_share]
     assert torch.equal(model.class_weight, class_weights(shares))

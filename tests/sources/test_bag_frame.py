@@ -91,7 +91,7 @@ def test_a_path_leads_into_a_bag(tmp_path) -> None:
 
 def test_the_single_file_of_a_folder_is_a_bag_too(tmp_path) -> None:
     for storage, name in (("mcap", "a.mcap"), ("sqlite3", "b.db3")):
-        bag = small_bag(tmp_path, storage, Path(name).stem)  # type: ignore[arg-type]
+        bag = small_bag(tmp_path, storage, Path(name).stem)
         assert len(named_frames([bag / name])) == 3
 
 

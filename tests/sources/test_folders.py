@@ -181,7 +181,7 @@ def test_what_is_no_scan_is_refused(tmp_path) -> None:
     with pytest.raises(InputError, match="scans: there are none"):
         source_of([])
     with pytest.raises(InputError, match="scans: dict is no scan"):
-        source_of([{}])  # type: ignore[list-item]
+        source_of([{}])
     with pytest.raises(InputError, match="there is no such file"):
         source_of(tmp_path / "absent.bin")
 

@@ -55,7 +55,7 @@ def test_a_frame_that_fails_is_passed_over_and_no_window_reaches_over_it() -> No
         except InputError as error:
             failed.append((frame.key, error.reason))
 
-    class Unreadable(type(broken)):  # type: ignore[misc]
+    class Unreadable(type(broken)):
         def read(self) -> Scan:
             raise InputError(self.name, "it is broken", "Repair it.")
 

@@ -45,7 +45,6 @@ def test_candidates_hold_at_least_the_rain_that_was_asked_for(sizes, inside) -> 
 
 def test_a_margin_keeps_rain_of_other_scans_inside() -> None:
     candidates = fit_candidates([street(50_000, 1)], CHANNELS, 0.99)
-    assert candidates is not None
     assert {bound.channel for bound in candidates.bounds} == {"range", "z", "intensity"}
     scan, rain = street(200_000, 2)
     # Tails that fall exponentially leave out a tenth of the hundredth that was allowed.
@@ -74,8 +73,6 @@ def test_the_bounds_follow_the_unit_of_the_data() -> None:
     (scan, rain) = street(20_000, 3)
     of_bytes = fit_candidates([(scan, rain)], CHANNELS)
     of_shares = fit_candidates([(scan.with_intensity_times(1 / 255), rain)], CHANNELS)
-    assert of_bytes is not None
-    assert of_shares is not None
     brightest = [
         next(bound.most for bound in fitted.bounds if bound.channel == "intensity")
         for fitted in (of_bytes, of_shares)
@@ -85,14 +82,12 @@ def test_the_bounds_follow_the_unit_of_the_data() -> None:
 
 def test_a_network_blind_to_intensity_has_no_bound_on_it() -> None:
     fitted = fit_candidates([street(5000, 4)], ("x", "y", "z"))
-    assert fitted is not None
     assert {bound.channel for bound in fitted.bounds} == {"range", "z"}
 
 
 def test_a_scan_without_intensity_bounds_none() -> None:
     scan, rain = street(5000, 5)
     fitted = fit_candidates([(Scan(scan.xyz), rain)], CHANNELS)
-    assert fitted is not None
     assert {bound.channel for bound in fitted.bounds} == {"range", "z"}
 
 

@@ -178,7 +178,6 @@ def test_candidates_have_the_neighbourhoods_that_they_have_among_all(
     view = NeighbourView(k)
     whole, part = view(scan), view.with_candidates(candidates)(scan)
     candidate = np.flatnonzero(candidates.among(scan)[whole.first])
-    assert part.candidates is not None
     assert part.size == len(part.candidates) == len(candidate)
     np.testing.assert_array_equal(part.points, whole.points)
     # Whose neighbourhoods there are: first those of the candidates.
@@ -210,7 +209,6 @@ def test_packing_keeps_the_candidates_of_every_scan_to_themselves() -> None:
     packed = Neighbourhoods.pack(views)
     row = point = candidate = 0
     for one in views:
-        assert one.candidates is not None
         rows, those = slice(row, row + len(one.neighbours)), slice(candidate, candidate + one.size)
         np.testing.assert_array_equal(packed["neighbours"][rows], one.neighbours + point)
         np.testing.assert_array_equal(packed["distances"][rows], one.distances)

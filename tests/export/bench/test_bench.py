@@ -150,7 +150,7 @@ def test_a_function_that_gives_no_mask_fails_in_every_scan(labelled, answer) -> 
 )
 def test_a_method_that_cannot_be_used_is_refused(methods, reason) -> None:
     with pytest.raises(InputError, match=reason):
-        bench_entries(methods)  # type: ignore[arg-type]
+        bench_entries(methods)
 
 
 def test_scans_that_cannot_be_benched_are_refused(labelled) -> None:

@@ -24,7 +24,6 @@ def test_a_process_of_its_own_holds_little_but_the_method(labelled) -> None:
 def test_a_method_that_cannot_be_timed_states_why(labelled) -> None:
     broken = BenchEntry("broken", "outdet", partial(load_method, "moved.onnx", {}))
     cost = measure_cost(broken, Timing(labelled.frames, repeats=1))
-    assert cost.failure is not None
     assert cost.failure.startswith("moved.onnx: no such method or file")
     assert np.isnan(cost.times.percentile(50))
     assert cost.peak_memory is None

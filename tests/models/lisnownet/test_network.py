@@ -301,7 +301,6 @@ def test_gradients_are_finite(share, value) -> None:
     valid[..., 3:10, :] = False
     image.requires_grad_()
     fill_holes(image, valid).square().sum().backward()
-    assert image.grad is not None
     assert image.grad.isfinite().all()
 
 
@@ -313,7 +312,6 @@ def test_ranges_of_every_size_stay_finite(largest) -> None:
     filled = fill_holes(image, valid)
     filled.sum().backward()
     assert filled.isfinite().all()
-    assert image.grad is not None
     assert image.grad.isfinite().all()
 
 

@@ -138,7 +138,6 @@ def test_values_and_gradients_are_finite(size, value, share, norm) -> None:
     loss = sparsity_loss(denoised, seen, valid, alpha=5, beta=0.5, norm=norm)
     loss.total.backward()
     assert all(part.isfinite() for part in loss)
-    assert denoised.grad is not None
     assert denoised.grad.isfinite().all()
 
 
@@ -155,5 +154,4 @@ def test_bfloat16_images_are_summed_in_float32() -> None:
     loss = sparsity_loss(denoised, denoised.detach(), all_valid(denoised), alpha=5, beta=0.5)
     loss.total.backward()
     assert loss.total.dtype == torch.float32
-    assert denoised.grad is not None
     assert denoised.grad.isfinite().all()

@@ -154,7 +154,6 @@ def test_both_losses_are_defined_for_one_kind_of_pixel(of, published_loss) -> No
     loss = losing(published_loss).segmentation_loss(logits, torch.full((40,), of)).total
     loss.backward()
     assert loss.isfinite()
-    assert logits.grad is not None
     assert logits.grad.isfinite().all()
 
 
