@@ -14,6 +14,7 @@ import numpy as np
 
 from derain.export.runtime import Derainer
 from derain.sources.folders import named_frames
+from derain.system.memory import keep_freed_memory
 
 
 def main() -> None:
@@ -25,6 +26,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--threads", type=int, default=2)
     arguments = parser.parse_args()
+    keep_freed_memory()  # as the node of ROS 2 does
     scans = [frame.read() for frame in named_frames(arguments.scans)]
     for name in arguments.models:
         derainer = Derainer(name, arguments.threads)

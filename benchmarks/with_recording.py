@@ -23,6 +23,7 @@ from derain.export.runtime import Derainer
 from derain.recordings.persistence import PersistenceDerainer
 from derain.sources.judging import judgements
 from derain.sources.method import Method
+from derain.system.memory import keep_freed_memory
 
 RECORDINGS = (
     *("WADS drive", "SnowyKITTI", "demonstration's streets"),
@@ -41,6 +42,7 @@ def main() -> None:
     parser.add_argument("--data", nargs="+", default=RECORDINGS, metavar="TITLE")
     parser.add_argument("--out", type=Path, help="file for the table")
     arguments = parser.parse_args()
+    keep_freed_memory()  # as `derain run` does
     methods: dict[str, Callable[[], Method]] = {
         "alone": lambda: Derainer(arguments.model),
         "with the scan before": lambda: RecordedDerainer(Derainer(arguments.model), 1, 0),

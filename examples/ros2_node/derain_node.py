@@ -40,6 +40,7 @@ from derain.bags.point_cloud import PointCloud, PointField, scan_of_cloud
 from derain.errors import InputError
 from derain.export.runtime import Derainer, Judgement
 from derain.files import read_scan
+from derain.system.memory import keep_freed_memory
 from derain.views.scan_issues import MOST_RAIN
 from derain.weather.alarm import Alarm, Level
 from derain.weather.scan_weather import ScanWeather
@@ -309,6 +310,7 @@ def main() -> int:
     import rclpy
     from rclpy.executors import ExternalShutdownException
 
+    keep_freed_memory()  # the memory of one cloud serves the next
     rclpy.init()
     node = rclpy.create_node("derain")
     try:
