@@ -24,8 +24,8 @@ def keep_freed_memory(kept: int = KEPT) -> None:
     """Keeps freed memory in the process, where its C library is glibc; elsewhere it does nothing.
 
     A command reads scan after scan of one size. By default glibc returns the arrays of each to the
-    system and requests those of the next, page by page. Commands of derain call this; a program that
-    judges scans in a loop calls it once, before the first.
+    system and requests those of the next, page by page. Commands of derain call this; a program
+    that judges scans in a loop calls it once, before the first.
 
     Args:
         kept: Most memory to keep, bytes, below 2³¹.

@@ -1,8 +1,8 @@
 """The cost of a method in deployment: milliseconds by stage, and memory.
 
 Each method is measured alone, in a fresh process without torch: no search for neighbours is shared,
-no other method's memory is counted, and a crash affects that method alone. As in ``derain run``, the
-memory of one scan serves the next.
+no other method's memory is counted, and a crash affects that method alone. As in ``derain run``,
+the memory of one scan serves the next.
 """
 
 from collections.abc import Sequence
