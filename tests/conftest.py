@@ -17,10 +17,13 @@ from filelock import FileLock
 from hypothesis import settings
 
 from derain.cli.main import main
+from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.scan import Scan
 
 if TYPE_CHECKING:
+    from types import ModuleType
+
     from matplotlib.figure import Figure
     from torch import nn
 
@@ -43,6 +46,36 @@ def shared() -> Path:
     if not (folder / "data").is_dir():
         pytest.skip(f"no real scans at {folder}; set DERAIN_SHARED to the folder that has them")
     return folder
+
+
+@pytest.fixture(scope="session")
+def open3d() -> "ModuleType":
+    """Open3D; tests that need it skip where it cannot be imported."""
+    from derain.system.open3d_import import import_open3d
+
+    try:
+        return import_open3d()
+    except InputError as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch) -> Path:
+    """The test's own folder, in which it runs."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def small_world(open3d, tmp_path) -> Path:
+    """A world that is quick to simulate: a bare street in the snow, seen by few beams."""
+    path = tmp_path / "small.yaml"
+    path.write_text(
+        "places: {street: 1}\nhorizon: 0\ncarrier: 0\n"
+        "sensors: {kinds: {front: 1}, front_rows: [32], front_step: [0.5, 1.0]}\n"
+        "precipitation: {snow: {weight: 1, crowding: [0.1, 0.3]}}\n"
+    )
+    return path
 
 
 @dataclass(frozen=True)
@@ -254,6 +287,14 @@ def salsanext_onnx(random_salsanext, made_once) -> Path:
 def one_block(monkeypatch) -> None:
     """Exports 3D-OutDet in one block: the same network, traced several times as quickly."""
     monkeypatch.setattr("derain.models.outdet.network.BLOCKS", 1)
+
+
+@pytest.fixture
+def short_proof(monkeypatch) -> None:
+    """Proves exported networks on one small scene; the whole proof has tests of its own."""
+    from derain.export import onnx_file
+
+    monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
 
 
 @pytest.fixture

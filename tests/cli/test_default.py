@@ -16,13 +16,11 @@ from derain.export.runtime import Derainer
 NAMED = "by the model that comes with derain: "
 
 
-@pytest.fixture
-def here(tmp_path, monkeypatch) -> Path:
-    """The working folder, with a folder of two scans."""
-    monkeypatch.chdir(tmp_path)
+@pytest.fixture(autouse=True)
+def _scans(here) -> None:
+    """Two folders of two scans in the working folder."""
     for folder in ("scans", "crf"):
-        write_scenes(tmp_path / folder, 200, 200, name="{}.bin")
-    return tmp_path
+        write_scenes(here / folder, 200, 200, name="{}.bin")
 
 
 def judged(folder: Path) -> list[np.ndarray]:

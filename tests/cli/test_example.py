@@ -1,9 +1,6 @@
 """The example that comes with derain: cleaned, looked at and described by its name alone."""
 
-from pathlib import Path
-
 import numpy as np
-import pytest
 
 import derain
 from derain.cards.card import load_card
@@ -12,12 +9,6 @@ from derain.files import read_scan
 from derain.sources.folders import named_frames
 
 RAIN = load_card("simulated").rain
-
-
-@pytest.fixture
-def here(tmp_path, monkeypatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
 
 
 def test_it_is_small_and_holds_rain_and_snow() -> None:

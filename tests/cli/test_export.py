@@ -11,7 +11,6 @@ from derain.export import onnx_file
 from derain.export.runtime import Derainer
 from derain.files import read_scan
 from derain.models.checkpoint import save_model
-from derain.scan import Scan
 
 
 @pytest.mark.usefixtures("one_block")
@@ -37,21 +36,18 @@ def test_a_checkpoint_becomes_a_model_with_its_proof_and_times(
 
 
 @pytest.fixture
-def scans(tmp_path, write_labelled, monkeypatch) -> Path:
+def scans(here, write_labelled) -> Path:
     """A folder of twenty labelled scans, more than eight bits are scaled by."""
-    monkeypatch.chdir(tmp_path)
     for number in range(20):
-        stem = tmp_path / f"scans/{number:02}"
+        stem = here / f"scans/{number:02}"
         write_labelled(stem.with_suffix(".bin"), stem.with_suffix(".label"), rain=110)
-    return tmp_path / "scans"
+    return here / "scans"
 
 
-@pytest.mark.usefixtures("one_block")
+@pytest.mark.usefixtures("one_block", "short_proof")
 def test_candidates_are_fitted_to_labelled_scans_and_their_cost_is_printed(
     succeed, checkpoint, onnx_model, scans, tmp_path, monkeypatch
 ) -> None:
-    # The whole proof is made above.
-    monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
     out, few = tmp_path / "candidates.onnx", sorted(scans.glob("*.bin"))[:2]
     options = ["--candidates", *few, "--card", "wads", "--inside", "0.9"]
     outcome = succeed("export", checkpoint, "--out", out, *options, "--repeats", "1")
@@ -88,11 +84,11 @@ def test_scans_that_candidates_are_fitted_to_count_once_and_are_warned_of(
     assert (scaled.messages, scaled.out) == ([], once.out)
 
 
+@pytest.mark.usefixtures("short_proof")
 def test_a_model_in_eight_bits_is_scaled_by_scans_like_those_it_will_see(
     succeed, random_salsanext, salsanext_onnx, scans, monkeypatch
 ) -> None:
     monkeypatch.setattr(onnx_file, "_traced", lambda *_: onnx.load(salsanext_onnx))
-    monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
     save_model(random_salsanext, Path("model.ckpt"))
     options = ["--int8", "--calibration", scans, "--scan", scans / "00.bin", "--repeats", "1"]
     outcome = succeed("export", "model.ckpt", "--out", "int8.onnx", *options)

@@ -14,13 +14,8 @@ from derain.models.salsanext.network import PUBLISHED_KEYS as SALSANEXT_KEYS
 from derain.views.spherical_grid import grid_of
 
 
-@pytest.fixture(autouse=True)
-def _in_a_folder_of_its_own(tmp_path, monkeypatch) -> None:
-    monkeypatch.chdir(tmp_path)
-
-
 @pytest.fixture
-def published(random_outdet) -> dict[str, Tensor]:
+def published(here, random_outdet) -> dict[str, Tensor]:
     """The random network's weights under the published names, also in a file of their own."""
     tensors = random_outdet.network.state_dict()
     weights = {published: tensors[ours] for ours, published in PUBLISHED_KEYS.items()}

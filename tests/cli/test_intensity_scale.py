@@ -11,9 +11,8 @@ ONCE = "--methods ssr dror --timed 1 --repeats 1"
 
 
 @pytest.fixture(autouse=True)
-def small(tmp_path, monkeypatch, write_labelled) -> None:
+def small(here, monkeypatch, write_labelled) -> None:
     """Three labelled scans, and the same with intensities of a 1024th, which float32 holds."""
-    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(scan_pictures, "save", lambda figure, path: None)
     for number in range(3):
         scan = Path(f"usual/{number}.bin")

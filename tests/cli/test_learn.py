@@ -14,26 +14,19 @@ from derain.annotation.manifest import Manifest
 from derain.cards.card import load_card
 from derain.evaluation.answers import Answers
 from derain.evaluation.hard_cases import scene
-from derain.export import onnx_file
 from derain.export.runtime import Derainer
 from derain.files import read_scan
 from derain.files.labels import read_labels, write_labels
 from derain.learning.start import STARTED_FROM
 from derain.models.checkpoint import save_model
 from derain.models.outdet import OutDet
-from derain.scan import Scan
 from derain.system.notices import warn
 from derain.workflows import learn, learn_report
 from derain.workflows.teaching import TeachResults
 
+pytestmark = pytest.mark.usefixtures("here", "short_proof")
+
 QUICK = ("--teacher", "dror", "--epochs", "1")
-
-
-@pytest.fixture(autouse=True)
-def _quickly(tmp_path, monkeypatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    # The whole proof has a test of its own.
-    monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
 
 
 @pytest.fixture

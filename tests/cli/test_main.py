@@ -40,12 +40,6 @@ def test_the_help_of_run_fits_a_screen_and_help_all_has_every_option(succeed) ->
     assert str(module_of("run").__doc__) in whole
 
 
-@pytest.mark.parametrize("arguments", [["wash"], [], ["run"], ["run", "model.onnx", "scan.bin"]])
-def test_a_command_that_cannot_be_understood_exits_with_2(refused, arguments) -> None:
-    line = refused(*arguments)
-    assert line.startswith("derain")
-
-
 @pytest.mark.parametrize(
     ("arguments", "suffix"),
     [

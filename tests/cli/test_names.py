@@ -27,9 +27,8 @@ TOO_LONG = 300 * "x"
 
 
 @pytest.fixture
-def scans(tmp_path, monkeypatch) -> list[Path]:
+def scans(here) -> list[Path]:
     """Labelled scans of those names, in a folder of such a name."""
-    monkeypatch.chdir(tmp_path)
     folder = Path(os.fsdecode(b"dir\xff\x1b[1m"))
     folder.mkdir()
     paths = [folder / os.fsdecode(name) for name in NAMES]
@@ -109,16 +108,12 @@ def test_odd_names_are_drawn(succeed, scans, number) -> None:
     ],
     ids=" ".join,
 )
-def test_a_name_that_is_too_long_is_one_line(refused, tmp_path, monkeypatch, command) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_a_name_that_is_too_long_is_one_line(refused, here, command) -> None:
     scene(300).tofile("a.bin")
     assert TOO_LONG in refused(*(word.format(long=TOO_LONG) for word in command))
 
 
-def test_a_scan_whose_labels_could_have_no_name_does_not_stop_the_others(
-    run_derain, tmp_path, monkeypatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_a_scan_whose_labels_could_have_no_name_does_not_stop_the_others(run_derain, here) -> None:
     Path("scans").mkdir()
     for name in ("a.bin", f"{251 * 'b'}.bin", "c.bin"):  # as long as a name may be
         scene(300).tofile(Path("scans") / name)

@@ -48,9 +48,8 @@ def test_a_value_that_an_option_cannot_have_is_refused_in_words(command, option,
 
 
 @pytest.fixture
-def beginner(tmp_path, monkeypatch) -> None:
+def beginner(here) -> None:
     """A working folder with what a beginner has."""
-    monkeypatch.chdir(tmp_path)
     for folder in ("scans", "empty", "mixed", "drive/velodyne", "drive/labels"):
         Path(folder).mkdir(parents=True)
     for name in ("scans/0.bin", "mixed/0.bin", "drive/velodyne/0.bin"):

@@ -86,10 +86,7 @@ def test_json_is_one_object_a_scan_and_nothing_else(succeed, onnx_model, scans, 
     ],
     ids=lambda command: command[0],
 )
-def test_damaged_records_break_no_command_that_needs_none(
-    succeed, scans, tmp_path, monkeypatch, command
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_damaged_records_break_no_command_that_needs_none(succeed, scans, here, command) -> None:
     for record in ("poses.txt", "times.txt", "calib.txt", "scans/metadata.csv"):
         Path(record).write_bytes(b"\xff damaged")
     succeed(*(word.format(scans=scans) for word in command))

@@ -7,20 +7,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import read_labels
-from derain.system.open3d_import import import_open3d
+
+pytestmark = pytest.mark.usefixtures("open3d")
 
 QUICK = ["--sensor", "mems_64", "--workers", "1", "--sequences", "3", "--scans", "1"]
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _open3d() -> None:
-    try:
-        import_open3d()
-    except InputError as error:
-        pytest.skip(str(error))
 
 
 @pytest.fixture

@@ -47,9 +47,8 @@ def test_default_is_the_checkpoint_that_derain_comes_with(tmp_path, monkeypatch)
     assert checkpoint_of("default") == tmp_path / "model.ckpt"
 
 
-def test_fit_begins_with_the_weights_of_its_start(succeed, tmp_path, wads, monkeypatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    source = trained(tmp_path / "start.ckpt")
+def test_fit_begins_with_the_weights_of_its_start(succeed, here, wads) -> None:
+    source = trained(here / "start.ckpt")
     # At a rate of nothing, it ends where it began.
     still = ("--model.learning_rate", "0", "--model.weight_decay", "0", "--trainer.max_epochs", "1")
     succeed("fit", *wads, "--start", "start.ckpt", *still, "--panels.scans", "1")

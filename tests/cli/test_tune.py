@@ -19,12 +19,10 @@ RAIN = np.tile(np.arange(300) >= 270, 3)  # of the three scans
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path, monkeypatch, write_labelled) -> Path:
-    """The folder in which the commands run, with three labelled scans."""
-    monkeypatch.chdir(tmp_path)
+def _scans(here, write_labelled) -> None:
+    """Three labelled scans in the working folder."""
     for number in range(3):
         write_labelled(Path(f"velodyne/{number}.bin"), Path(f"labels/{number}.label"), rain=110)
-    return tmp_path
 
 
 DATA = ["--data", "velodyne", "--card", "wads"]

@@ -178,11 +178,10 @@ def test_a_scan_that_cannot_be_read_is_reported_once_and_shown_empty(
     ],
 )
 def test_what_cannot_be_meant_is_refused_and_nothing_is_written(
-    refused, recording, tmp_path, monkeypatch, options, message
+    refused, recording, here, options, message
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     assert message in refused("view", recording, *options)
-    assert [file.name for file in tmp_path.iterdir()] == ["drive"]
+    assert [file.name for file in here.iterdir()] == ["drive"]
 
 
 def test_a_file_that_is_there_stays_until_the_new_one_is_whole(

@@ -10,25 +10,14 @@ from derain.simulation.campaign import Campaign
 from derain.simulation.manifest import MAKER, write_manifest
 from derain.simulation.sensor import Sensor
 from derain.simulation.world import WorldCampaign
-from derain.system.open3d_import import import_open3d
-
-WORLD = (
-    "places: {street: 1}\nhorizon: 0\ncarrier: 0\n"
-    "sensors: {kinds: {front: 1}, front_rows: [32], front_step: [0.5, 1.0]}\n"
-)
 
 
 @pytest.fixture(params=[Simulated, Worlds])
-def data(request, tmp_path) -> ScanDataModule:
+def data(request, small_world, tmp_path) -> ScanDataModule:
     """A data set of two training sequences and one to validate, of a scan each."""
-    try:
-        import_open3d()
-    except InputError as error:
-        pytest.skip(str(error))
     root = str(tmp_path / "made")
     if request.param is Worlds:
-        (tmp_path / "small.yaml").write_text(WORLD)
-        campaign = WorldCampaign(train=2, validation=1, world=str(tmp_path / "small.yaml"))
+        campaign = WorldCampaign(train=2, validation=1, world=str(small_world))
         return Worlds(root, campaign, workers=1)
     sensor = Sensor(rows=8, columns=40)
     return Simulated(root, Campaign(2, 1, 0, scans=1, rain_rates=(50.0,), sensor=sensor))

@@ -15,11 +15,8 @@ import yaml
 
 import derain
 from derain.cli import main as command_line
-from derain.evaluation.hard_cases import scene
-from derain.export import onnx_file
 from derain.export.bench import bench
 from derain.export.bench.cost import measure_in_process
-from derain.scan import Scan
 
 from .pages import PAGES, REPOSITORY, Snippet, snippets
 from .prepared import prepare, put_networks, write_drive
@@ -60,14 +57,13 @@ def page_folder(
     monkeypatch.chdir(tmp_path)
     # The page of troubles shows what is printed where this runtime is missing.
     monkeypatch.setitem(sys.modules, "openvino", None)
-    # The whole proof and the timing have tests of their own.
-    monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
+    # The timing has tests of its own.
     monkeypatch.setattr(bench, "measure_cost", measure_in_process)
     with torch.random.fork_rng(devices=[]):
         yield tmp_path
 
 
-@pytest.mark.usefixtures("one_block")
+@pytest.mark.usefixtures("one_block", "short_proof")
 @pytest.mark.parametrize("page", WITH_SNIPPETS, ids=name_of)
 def test_a_page_runs_from_its_first_snippet_to_its_last(page, page_folder) -> None:
     namespace: dict[str, Any] = {}

@@ -7,8 +7,6 @@ import pytest
 from numpy.typing import NDArray
 
 from derain import Scan
-from derain.errors import InputError
-from derain.system.open3d_import import import_open3d
 
 Columns = dict[str, NDArray[Any]]
 
@@ -33,12 +31,3 @@ def scan(columns) -> Scan:
     """The scan of those columns."""
     xyz = np.stack([columns[axis] for axis in "xyz"], axis=1)
     return Scan(xyz, columns["intensity"].astype(np.float32), fields=columns)
-
-
-@pytest.fixture(scope="session")
-def open3d() -> Any:
-    """Open3D, a reader of PCD and PLY that shares no line with ours."""
-    try:
-        return import_open3d()
-    except InputError as error:
-        pytest.skip(str(error))

@@ -7,12 +7,10 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
-from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.filters import DROR, DSOR, ROR, SOR, SSR, FilterDerainer, PointFilter, filter_view
 from derain.filters.radius_filters import has_few_neighbours
 from derain.scan import Scan
-from derain.system.open3d_import import import_open3d
 
 # Few values on a coarse grid: copies, equal distances, points at the origin, radii that are met
 # exactly. Few points: neighbourhoods larger than the scan.
@@ -186,11 +184,7 @@ def test_points_settled_along_the_curve_are_settled_right(filter_) -> None:
         np.testing.assert_array_equal(few, lonely[rows])
 
 
-def test_ror_and_sor_remove_what_open3d_removes() -> None:
-    try:
-        open3d = import_open3d()
-    except InputError as error:
-        pytest.skip(str(error))
+def test_ror_and_sor_remove_what_open3d_removes(open3d) -> None:
     points = scene(2000)
     positions = open3d.utility.Vector3dVector(points[:, :3].astype(np.float64))
     cloud = open3d.geometry.PointCloud(positions)

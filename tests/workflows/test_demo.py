@@ -9,29 +9,17 @@ import yaml
 from matplotlib.image import imread
 from recorded_scenes import write_scenes
 
-from derain.errors import InputError
-from derain.evaluation.hard_cases import scene
-from derain.export import onnx_file
 from derain.export.bench.bench import Effort
 from derain.export.bench.report import SHORT
 from derain.files import DEFAULT_COLUMNS, read_scan
-from derain.scan import Scan
 from derain.simulation.campaign import Campaign
-from derain.system.open3d_import import import_open3d
 from derain.workflows.demo import DemoConfig, clean_given_scans, run_demo
 from derain.workflows.progress import Steps
 
 
 @pytest.fixture
-def small(tmp_path, monkeypatch) -> DemoConfig:
+def small(open3d, here, short_proof) -> DemoConfig:
     """Three streets of one scan each, one network for one epoch, and two methods beside it."""
-    try:
-        import_open3d()
-    except InputError as error:
-        pytest.skip(str(error))
-    monkeypatch.chdir(tmp_path)
-    # The whole proof has a test of its own.
-    monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
     Path("sensor.yaml").write_text(yaml.safe_dump({"rows": 16, "columns": 60}))
     return DemoConfig(
         Path("demo"),

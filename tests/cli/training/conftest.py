@@ -6,9 +6,8 @@ import pytest
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path, monkeypatch) -> None:
+def _own_folder(here) -> None:
     """Runs, checkpoints and predictions go to a folder of the test's own."""
-    monkeypatch.chdir(tmp_path)
 
 
 @pytest.fixture

@@ -9,13 +9,10 @@ import pytest
 import yaml
 
 from derain.annotation.teach import teach
-from derain.evaluation.hard_cases import scene
-from derain.export import onnx_file
 from derain.export.runtime import Derainer
 from derain.files import read_scan
 from derain.filters import DROR, FilterDerainer
 from derain.models.checkpoint import load_model
-from derain.scan import Scan
 from derain.sources.folders import named_frames
 from derain.workflows.configurations import packaged_configs
 from derain.workflows.training import DerainCLI
@@ -83,7 +80,7 @@ def test_model_data_and_trainer_are_those_that_a_packaged_configuration_names(
         assert type(part).__module__.startswith(package)
 
 
-@pytest.mark.usefixtures("one_block", "two_sizes")
+@pytest.mark.usefixtures("one_block", "two_sizes", "short_proof")
 @pytest.mark.parametrize(
     ("config", "prepare"),
     [
@@ -114,8 +111,6 @@ def test_a_packaged_configuration_is_trained_measured_and_deployed(
 
     # As the deployed model computes, whatever the training did.
     succeed("predict", *data, "--trainer.precision", "32", "--ckpt_path", checkpoint)
-    # The whole proof has tests of its own.
-    monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
     timed_on = ["--scan", scans[0], "--repeats", "1"]
     succeed("export", checkpoint, "--out", "model.onnx", *timed_on)
     derainer = Derainer("model.onnx")

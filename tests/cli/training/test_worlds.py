@@ -2,33 +2,17 @@
 
 from pathlib import Path
 
-import pytest
 import yaml
 
-from derain.errors import InputError
 from derain.models.checkpoint import load_model
 from derain.models.cues import CueFusion
-from derain.system.open3d_import import import_open3d
 from derain.workflows.configurations import packaged_configs
 
-WORLD = """
-places: {street: 1}
-horizon: 0
-carrier: 0
-sensors: {kinds: {front: 1}, front_rows: [32], front_step: [0.5, 1.0]}
-precipitation: {snow: {weight: 1, crowding: [0.1, 0.3]}}
-"""
 
-
-def test_worlds_are_made_and_trained_on(succeed) -> None:
-    try:
-        import_open3d()
-    except InputError as error:
-        pytest.skip(str(error))
-    Path("small.yaml").write_text(WORLD, "utf-8")
+def test_worlds_are_made_and_trained_on(succeed, small_world) -> None:
     config = yaml.safe_load(packaged_configs()["cues_worlds.yaml"].read_text("utf-8"))
     for part in config["data"]["init_args"]["parts"].values():
-        part["init_args"]["campaign"] |= {"world": "small.yaml", "train": 2, "validation": 1}
+        part["init_args"]["campaign"] |= {"world": small_world.name, "train": 2, "validation": 1}
         part["init_args"]["workers"] = 1
     Path("worlds.yaml").write_text(yaml.safe_dump(config), "utf-8")
     options = [

@@ -31,6 +31,6 @@ def labelled(tmp_path) -> LabelledFrames:
 
 
 @pytest.fixture
-def here(monkeypatch) -> None:
+def in_this_process(monkeypatch) -> None:
     """Times methods in this process; that each has its own is tested by itself."""
     monkeypatch.setattr(bench, "measure_cost", measure_in_process)

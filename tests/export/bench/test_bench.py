@@ -50,7 +50,7 @@ def test_a_row_is_called_by_its_title_else_by_its_name(tmp_path) -> None:
     assert rows[0].facts[FILE_SIZE] == len(KEPT.read_bytes())
 
 
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("in_this_process")
 def test_methods_are_names_files_derainers_filters_and_functions(labelled, tmp_path) -> None:
     derainer = Derainer(KEPT, 1)
     derainer.spec = replace(derainer.spec, threshold=0.4)
@@ -82,7 +82,7 @@ def test_methods_are_names_files_derainers_filters_and_functions(labelled, tmp_p
     assert [row.title for row in untitled.rows] == ["dsor", "outdet", "all_points"]
 
 
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("in_this_process")
 def test_scans_in_memory_score_as_the_same_scans_in_files(labelled) -> None:
     methods = ["dsor", "position", "intensity"]
     files = [frame.path for frame in labelled.frames]
@@ -161,7 +161,7 @@ def test_scans_that_cannot_be_benched_are_refused(labelled) -> None:
         bench(["all"], labelled.frames, labelled.card)
 
 
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize(("rain", "warned"), [((3,), False), ((9,), True)])
 def test_a_bench_without_rain_warns(labelled, capsys, rain, warned) -> None:
     frames, card = labelled.frames[1:], replace(labelled.card, rain=rain, unknown=())
@@ -201,7 +201,7 @@ def test_every_model_is_followed_by_itself_by_the_other_runtime(tmp_path) -> Non
         bench_entries(["dror", "all"], runtime=Runtime("rainy"))
 
 
-@pytest.mark.usefixtures("rainy", "here")
+@pytest.mark.usefixtures("rainy", "in_this_process")
 def test_what_another_runtime_changes_is_counted_and_its_failure_is_stated(
     labelled, tmp_path, monkeypatch
 ) -> None:
