@@ -28,8 +28,7 @@ from derain.sources.folders import named_frames
 
 @pytest.fixture(params=STORAGES)
 def storage(request) -> Storage:
-    kind: Storage = request.param
-    return kind
+    return request.param
 
 
 def read_all(bag: Path) -> int:

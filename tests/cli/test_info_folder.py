@@ -89,6 +89,21 @@ def test_units_are_counted_as_one_process_counts_and_not_again(
     assert seen == ["001/000000", "001/000001"]
 
 
+def test_a_unit_that_cannot_be_counted_does_not_stop_the_others_of_a_folder_of_records(
+    run_derain, succeed, data_set, tmp_path
+) -> None:
+    scan = data_set / "sequences/000/lidar_radar_pcd/000001.bin"
+    content = scan.read_bytes()
+    scan.write_bytes(b"broken")
+    command = ("info", data_set, "--out", tmp_path / "counts")
+    outcome = run_derain(*command)
+    assert (outcome.code, outcome.out) == (2, "")
+    assert "1 of 3 units failed" in outcome.err.splitlines()[-1]
+    assert "2 of 3 units done, 1 failed" in run_derain("status", tmp_path / "counts").out
+    scan.write_bytes(content)
+    assert succeed(*command).out == succeed("info", data_set).out
+
+
 def test_records_are_of_one_folder_and_are_asked_for(refused, data_set, tmp_path) -> None:
     assert "--out" in refused("info", data_set, data_set, "--out", tmp_path / "counts")
     assert "--out" in refused("info", data_set, "--shard", "0/2")

@@ -28,8 +28,7 @@ XYZI = ("x", "y", "z", "intensity")
 
 @pytest.fixture(params=STORAGES)
 def storage(request) -> Storage:
-    kind: Storage = request.param
-    return kind
+    return request.param
 
 
 def test_frames_are_the_clouds_in_order(tmp_path, storage) -> None:

@@ -32,8 +32,7 @@ RUN = ("run", "ror", "--set", "radius=2", "--set", "neighbours=3")
 
 @pytest.fixture(params=STORAGES)
 def storage(request) -> Storage:
-    kind: Storage = request.param
-    return kind
+    return request.param
 
 
 def cloud_of(message: bytes, storage: Storage) -> CloudMessage:
