@@ -26,7 +26,6 @@ from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.sources.judging import Failures
 from derain.sources.records import POSES
-from derain.system.memory import keep_freed_memory
 from derain.system.stopwatch import Stopwatch
 from derain.workflows.odometry import find_poses
 
@@ -60,7 +59,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    keep_freed_memory()
     source = named_frames(arguments.sequences, arguments.columns, topic=arguments.topic)
 
     def show(frame: Frame, registration: Registration, stopwatch: Stopwatch) -> None:

@@ -92,7 +92,6 @@ from derain.sources.recordings import irregularities
 from derain.sources.store_listing import frames_at
 from derain.sources.stored_frame import StoredBag
 from derain.stores.url import Place, is_url, place_of
-from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
 from derain.views.scan_issues import MOST_RAIN, ScanIssue
 from derain.weather.record import weather_row
@@ -158,7 +157,6 @@ def add_arguments(parser: Parser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    keep_freed_memory()
     name, scans = method_and_scans(arguments.method, arguments.scans or [])
     division = division_of(arguments)
     single_scan_method = method_of(name, arguments)

@@ -1,6 +1,5 @@
 """Memory of one scan that the next one reuses."""
 
-import ctypes
 import os
 from contextlib import suppress
 from pathlib import Path
@@ -24,7 +23,7 @@ def keep_freed_memory(kept: int = KEPT) -> None:
     """Keeps freed memory in the process, where its C library is glibc; elsewhere it does nothing.
 
     A command reads scan after scan of one size. By default glibc returns the arrays of each to the
-    system and requests those of the next, page by page. Commands of derain call this; a program
+    system and requests those of the next, page by page. The commands of derain call this; a program
     that judges scans in a loop calls it once, before the first.
 
     Args:
@@ -34,6 +33,8 @@ def keep_freed_memory(kept: int = KEPT) -> None:
         >>> import derain
         >>> derain.keep_freed_memory()
     """
+    import ctypes  # not needed to print a version or help
+
     try:
         mallopt = ctypes.CDLL(None).mallopt
     except (AttributeError, OSError, TypeError):  # another C library, or another system

@@ -13,6 +13,8 @@ from derain.models.salsanext import SalsaNext
 from derain.models.salsanext.network import PUBLISHED_KEYS as SALSANEXT_KEYS
 from derain.views.spherical_grid import grid_of
 
+pytestmark = pytest.mark.usefixtures("here")
+
 
 @pytest.fixture
 def published(here, random_outdet) -> dict[str, Tensor]:

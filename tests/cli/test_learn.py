@@ -30,7 +30,7 @@ QUICK = ("--teacher", "dror", "--epochs", "1")
 
 
 @pytest.fixture
-def recording() -> Path:
+def recording(here) -> Path:
     """Five scans of 600 points, a tenth of them drops."""
     return write_scenes(Path("drive/velodyne"), *5 * [600])
 
