@@ -37,9 +37,6 @@ KITTI, TUM = 12, 8
 LONGEST_GAP = 1.0
 TIME_ROUNDING = 0.005
 
-# Closer than this, in radians, two rotations are the same to every digit, and a line is an arc.
-NO_ANGLE = 1e-9
-
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
@@ -276,7 +273,7 @@ def slerp(
     if cosine < 0:  # both signs of a quaternion are one rotation; this one is nearer
         second, cosine = -second, -cosine
     angle = float(np.arctan2(np.linalg.norm(second - cosine * first), cosine))
-    if angle < NO_ANGLE:
+    if not angle:
         return first
     weights = np.sin([(1 - share) * angle, share * angle]) / np.sin(angle)
     mixed: NDArray[np.float64] = weights[0] * first + weights[1] * second
