@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from derain.scan import Scan
 from derain.system.cores import sleeping_threads
-from derain.views.morton import distinct_positions
+from derain.views.morton import distinct_rows
 
 with sleeping_threads():
     import small_gicp
@@ -126,11 +126,11 @@ class Surfaces:
 
 def _points_in_reach(scan: Scan) -> NDArray[np.float64]:
     """Distinct positions neither too near nor too far, spread over the scan, float64 (M, 3)."""
-    in_reach = scan.valid & (scan.range > NEAREST) & (scan.range < FARTHEST)
-    xyz = scan.xyz.compress(in_reach, axis=0)
-    first, _ = distinct_positions(xyz)
-    step = -(-len(first) // MOST_REGISTERED)
-    return xyz.take(first[:: max(step, 1)], axis=0).astype(np.float64)
+    rows, _ = distinct_rows(scan)
+    distance = scan.range[rows]
+    rows = rows[(distance > NEAREST) & (distance < FARTHEST)]
+    step = -(-len(rows) // MOST_REGISTERED)
+    return scan.xyz.take(rows[:: max(step, 1)], axis=0).astype(np.float64)
 
 
 def _facing(found: "small_gicp.RegistrationResult") -> float:

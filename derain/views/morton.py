@@ -4,6 +4,8 @@ Neighbours in space become neighbours in memory: the kNN search and the network'
 faster on points in this order, with the same answers.
 """
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -113,13 +115,31 @@ def distinct_rows(scan: Scan) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     Returns:
         ``first``, int64 (M,): the lowest row at each position, along a Morton curve; and
         ``inverse``, int64 (N,): for every row the number of its position, -1 for invalid rows.
+        Both are read-only.
     """
+    found = _of_last_scan.get(scan)
+    if found is None:
+        found = _distinct_rows(scan)
+        _of_last_scan.clear()
+        _of_last_scan[scan] = found
+    return found
+
+
+# Views, rays and pairs of returns ask in turn about the same scan.
+_of_last_scan: WeakKeyDictionary[Scan, tuple[NDArray[np.int64], NDArray[np.int64]]] = (
+    WeakKeyDictionary()
+)
+
+
+def _distinct_rows(scan: Scan) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     valid = np.flatnonzero(scan.valid)
     # take is four times faster than indexing for rows of three numbers.
     first, inverse_of_valid = distinct_positions(scan.xyz.take(valid, axis=0))
     inverse = np.full(len(scan), -1, np.int64)
     inverse[valid] = inverse_of_valid
-    return valid[first], inverse
+    first = valid[first]
+    first.flags.writeable = inverse.flags.writeable = False
+    return first, inverse
 
 
 def first_rows(scan: Scan) -> NDArray[np.int64]:
