@@ -176,5 +176,5 @@ def vote(points: ScanPoints, log_odds: NDArray[np.float64]) -> NDArray[np.float6
     half_at = (offset + slope * points.range)[:, None]
     weight = 1 / (1 + np.square(points.distances / half_at))
     votes = np.clip(log_odds, -LARGEST_LOG_ODDS, LARGEST_LOG_ODDS).take(points.neighbours)
-    total: NDArray[np.float64] = (weight * votes).sum(axis=1)
+    total: NDArray[np.float64] = np.einsum("ij,ij->i", weight, votes)
     return total

@@ -171,10 +171,11 @@ def ray_evidence(
     if at_drops is not None:
         ending &= ~at_drops[near_rays]
     weight = near / (1 + np.square(angles / np.radians(HALF_WEIGHT_AT)))
-    total_weight = np.maximum(weight.sum(axis=1), LEAST_WEIGHT)
+    # einsum adds up short rows several times faster than a sum along the axis.
+    total_weight = np.maximum(np.einsum("ij->i", weight), LEAST_WEIGHT)
     return RayEvidence(
-        (weight * ending).sum(axis=1) / total_weight,
-        (weight * (behind > through)).sum(axis=1) / total_weight,
+        np.einsum("ij,ij->i", weight, ending) / total_weight,
+        np.einsum("ij,ij->i", weight, behind > through) / total_weight,
     )
 
 
