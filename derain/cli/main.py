@@ -15,7 +15,6 @@ from derain.cli.parser import Parser
 from derain.cli.signals import interrupting
 from derain.errors import InputError, ScanWarning
 from derain.system.extras import TRAINING_LIBRARIES, missing_extra, require
-from derain.system.memory import keep_freed_memory
 
 DESCRIPTION = """\
 Takes the rain out of LiDAR and fused LiDAR + 4D-radar scans.
@@ -154,6 +153,8 @@ def _run(arguments: list[str]) -> int:
         return _run_training(arguments)
     command = next((word for word in arguments if word in COMMANDS), None)
     chosen = _parser(command).parse_args(arguments)
+    from derain.system.memory import keep_freed_memory  # not needed to print a version or help
+
     keep_freed_memory()
     return int(module_of(chosen.command).main(chosen))
 

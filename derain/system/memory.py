@@ -1,5 +1,6 @@
 """Memory of one scan that the next one reuses."""
 
+import ctypes
 import os
 from contextlib import suppress
 from pathlib import Path
@@ -33,8 +34,6 @@ def keep_freed_memory(kept: int = KEPT) -> None:
         >>> import derain
         >>> derain.keep_freed_memory()
     """
-    import ctypes  # not needed to print a version or help
-
     try:
         mallopt = ctypes.CDLL(None).mallopt
     except (AttributeError, OSError, TypeError):  # another C library, or another system
