@@ -1,7 +1,5 @@
 """A Dask cluster as an executor, and schedulers that are not there."""
 
-from collections.abc import Iterator
-
 import pytest
 from jobs.counting import Counting
 
@@ -14,35 +12,19 @@ from derain.jobs.unit import Unit
 distributed = pytest.importorskip("distributed", reason="needs derain[cluster]")
 
 
-@pytest.fixture
-def scheduler() -> Iterator[str]:
-    """Address of a scheduler of this process, with two workers."""
-    options = {"processes": False, "dashboard_address": None, "threads_per_worker": 1}
-    with distributed.LocalCluster(n_workers=2, protocol="tcp://", **options) as cluster:
-        yield cluster.scheduler_address
-
-
-def test_its_workers_do_the_units_of_a_job(scheduler, tmp_path) -> None:
+def test_a_cluster_does_the_units_of_a_job_and_repeats_one_whose_worker_dies(tmp_path) -> None:
     units = [Unit(id=str(number), size=1, inputs="") for number in range(5)]
-    task = Task(Job.begin(tmp_path, {"command": "count"}, units), Counting(tmp_path, ("3",)))
-    with dask_executor(scheduler) as executor:
-        found = [each.result for each in run(task, units, executor)]
-    contents = [each.content for each in found]
-    assert contents == ["0 done", "1 done", "2 done", None, "4 done"]
-    assert found[3].error.reason == "is broken"
-
-
-def test_a_unit_whose_worker_dies_is_done_by_another(tmp_path) -> None:
-    units = [Unit(id=str(number), size=1, inputs="") for number in range(4)]
-    work = Counting(tmp_path, killing_once=("1",))
+    work = Counting(tmp_path, failing=("3",), killing_once=("1",))
     task = Task(Job.begin(tmp_path, {"command": "count"}, units), work)
     options = {"processes": True, "dashboard_address": None, "threads_per_worker": 1}
     with (
         distributed.LocalCluster(n_workers=2, protocol="tcp://", **options) as cluster,
         dask_executor(cluster.scheduler_address) as executor,
     ):
-        contents = [each.result.content for each in run(task, units, executor)]
-    assert contents == [f"{number} done" for number in range(4)]
+        found = [each.result for each in run(task, units, executor)]
+    contents = [each.content for each in found]
+    assert contents == ["0 done", "1 done", "2 done", None, "4 done"]
+    assert found[3].error.reason == "is broken"
     assert len((tmp_path / "1.tries").read_text().splitlines()) == 2
 
 

@@ -104,10 +104,13 @@ def test_processes_that_cannot_do_the_work_end_it_with_one_reason(out, executor)
     assert len(job_status(out, lambda record: None).missing) == 5
 
 
-def test_another_version_of_derain_is_refused(out) -> None:
-    task = Task(begun(out), Counting(out), version="0.0.1")
+def test_processes_of_another_version_or_folder_are_refused(out) -> None:
+    job, work = begun(out), Counting(out)
     with pytest.raises(InputError, match=r"this command 0\.0\.1"):
-        task.check()
+        Task(job, work, version="0.0.1").check()
+    with pytest.raises(InputError, match=f"they begin in {out}"):
+        Task(job, work, folder=out).check()
+    Task(job, work, folder=Path.cwd()).check()
 
 
 def test_an_executor_that_has_ended_is_reported_and_the_rest_is_done_later(out) -> None:
@@ -139,10 +142,3 @@ def test_a_folder_without_a_job_has_no_status(out) -> None:
     (out / ".derain" / "job.json").write_text(json.dumps({"options": {}, "shards": None}))
     with pytest.raises(InputError, match="not listed"):
         job_status(out, lambda record: None)
-
-
-def test_processes_in_another_folder_refuse_relative_paths(out) -> None:
-    task = Task(begun(out), Counting(out), folder=out)
-    with pytest.raises(InputError, match=f"they begin in {out}"):
-        task.check()
-    Task(begun(out), Counting(out), folder=Path.cwd()).check()

@@ -42,25 +42,21 @@ def test_an_array_expression_names_each_task_once(numbers) -> None:
     assert named == sorted(numbers)
 
 
+def slurm_task(number: int, first: int, last: int) -> Shard | None:
+    """The shard of a task of a SLURM array."""
+    names = ("SLURM_ARRAY_TASK_ID", "SLURM_ARRAY_TASK_MIN", "SLURM_ARRAY_TASK_MAX")
+    return Shard.of_environment(dict(zip(names, map(str, (number, first, last)), strict=True)))
+
+
 def test_the_tasks_of_a_slurm_array_are_counted_from_its_first() -> None:
-    environment = {
-        "SLURM_ARRAY_TASK_ID": "7",
-        "SLURM_ARRAY_TASK_MIN": "5",
-        "SLURM_ARRAY_TASK_MAX": "8",
-    }
-    task = Shard.of_environment(environment)
+    task = slurm_task(7, 5, 8)
     assert task == Shard(2, 4, first=5, of_array=True)
     assert Shard.of_environment({}) is None
     assert task.within(None) == task
 
 
 def test_tasks_that_are_run_again_do_the_shards_that_the_job_was_begun_in() -> None:
-    environment = {
-        "SLURM_ARRAY_TASK_ID": "17",
-        "SLURM_ARRAY_TASK_MIN": "3",
-        "SLURM_ARRAY_TASK_MAX": "20",
-    }
-    task = Shard.of_environment(environment)
+    task = slurm_task(17, 3, 20)
     assert task.within((100, 1)) == Shard(16, 100, first=1, of_array=True)
     with pytest.raises(InputError, match="no shard 17: the 10 shards are 0 to 9"):
         task.within((10, 0))

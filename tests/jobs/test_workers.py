@@ -16,10 +16,6 @@ def begin(file: Path, seconds: float) -> str:
     return file.name
 
 
-def not_sendable() -> threading.Lock:
-    return threading.Lock()
-
-
 def test_an_error_ends_what_is_done_and_begins_nothing_more(tmp_path) -> None:
     files = [tmp_path / str(number) for number in range(4)]
     futures = []
@@ -40,4 +36,4 @@ def test_all_work_is_done_at_the_end_of_the_block(tmp_path) -> None:
 
 def test_an_answer_that_cannot_be_sent_is_an_error(tmp_path) -> None:
     with WorkerPool(1) as pool, pytest.raises(TypeError, match="cannot be sent"):
-        pool.submit(not_sendable).result()
+        pool.submit(threading.Lock).result()
