@@ -2,11 +2,10 @@
 
 import pickle
 import random
-from pathlib import Path
 
 import numpy as np
 import pytest
-from small_bags import small_bag, tables
+from small_bags import small_bag, storage_file, tables
 
 from benchmarks.recorded_bags import (
     CLOUD_TYPE,
@@ -16,7 +15,6 @@ from benchmarks.recorded_bags import (
     STORAGES,
     Recorded,
     Ros,
-    Storage,
     table_of,
 )
 from derain.errors import InputError
@@ -26,11 +24,7 @@ from derain.sources.folders import frame_of, named_frames
 XYZI = ("x", "y", "z", "intensity")
 
 
-@pytest.fixture(params=STORAGES)
-def storage(request) -> Storage:
-    return request.param
-
-
+@pytest.mark.parametrize("storage", STORAGES)
 def test_frames_are_the_clouds_in_order(tmp_path, storage) -> None:
     bag = small_bag(tmp_path, storage)
     source = named_frames([bag])
@@ -61,6 +55,7 @@ def test_a_cloud_without_a_stamp_was_taken_when_it_was_recorded(tmp_path) -> Non
     assert named_frames([bag])[0].time == pytest.approx(1e-9 * START, abs=1e-6)
 
 
+@pytest.mark.parametrize("storage", STORAGES)
 @pytest.mark.parametrize("period", [PERIOD, 0])
 def test_any_order_gives_the_same_clouds_also_of_one_time(tmp_path, storage, period) -> None:
     ros, clouds = Ros(storage), tables(24, points=20)
@@ -76,22 +71,18 @@ def test_any_order_gives_the_same_clouds_also_of_one_time(tmp_path, storage, per
         np.testing.assert_array_equal(source[number].read().xyz[:, 0], clouds[number]["x"])
 
 
-def test_a_path_leads_into_a_bag(tmp_path) -> None:
-    bag = small_bag(tmp_path, "mcap")
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_a_path_leads_into_a_bag(tmp_path, storage) -> None:
+    bag = small_bag(tmp_path, storage)
     for path in (bag / "velodyne_points" / "000002", bag / "000002"):
         (frame,) = named_frames([path])
         assert frame.number == 2
         np.testing.assert_array_equal(frame.read().xyz[:, 0], tables()[2]["x"])
         assert frame_of(path).name == frame.name == str(bag / "velodyne_points" / "000002")
-    assert len(named_frames([bag / "velodyne_points"])) == 3
+    for whole in (bag / "velodyne_points", storage_file(bag)):
+        assert len(named_frames([whole])) == 3
     with pytest.raises(InputError, match="/velodyne_points has 3"):
         named_frames([bag / "000003"])
-
-
-def test_the_single_file_of_a_folder_is_a_bag_too(tmp_path) -> None:
-    for storage, name in (("mcap", "a.mcap"), ("sqlite3", "b.db3")):
-        bag = small_bag(tmp_path, storage, Path(name).stem)
-        assert len(named_frames([bag / name])) == 3
 
 
 def test_a_folder_of_bags_stands_for_them(tmp_path) -> None:
