@@ -1,18 +1,17 @@
 """Whole recordings given to a method: every frame is answered for, in order, or passed over."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
 from window_method import Between
 
-from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.filters import DROR, FilterDerainer
 from derain.scan import Scan
+from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
-from derain.sources.judging import judgements
+from derain.sources.judging import Failures, judgements
 from derain.sources.source import Frames
 
 
@@ -44,24 +43,10 @@ def test_every_frame_is_answered_for_in_its_order(method, lengths) -> None:
 
 
 def test_a_frame_that_fails_is_passed_over_and_no_window_reaches_over_it() -> None:
-    frames = drive(6)
-    broken = frames[2]
-    failed = []
-
-    @contextmanager
-    def guard(frame: Frame) -> Iterator[None]:
-        try:
-            yield
-        except InputError as error:
-            failed.append((frame.key, error.reason))
-
-    class Unreadable(type(broken)):
-        def read(self) -> Scan:
-            raise InputError(self.name, "it is broken", "Repair it.")
-
-    frames[2] = Unreadable(**vars(broken))
-    answers = list(judgements(Between(), frames, guard))
+    frames, failures = drive(6), Failures(lambda error: None)
+    frames[2] = FileFrame(key="2", sequence="0", number=2, path=Path("absent.bin"))
+    answers = list(judgements(Between(), frames, failures.skipping_failures))
     assert [frame.number for frame, _, _ in answers] == [0, 1, 3, 4, 5]
-    assert failed == [(broken.key, "it is broken")]
+    assert [error.subject for error in failures.errors] == [Path("absent.bin")]
     sure = [judgement.known is not None and judgement.known.any() for _, judgement, _ in answers]
     assert sure == [False, False, False, True, False]

@@ -1,6 +1,7 @@
 """Frames by recordings, and what of a recording does not suit a method of several scans."""
 
 import pytest
+from recorded_scenes import write_scenes
 
 from derain.evaluation.hard_cases import scene
 from derain.scan import Scan
@@ -73,23 +74,21 @@ def test_names_that_are_numbers_break_a_recording_where_no_times_do(
     tmp_path, names, lengths
 ) -> None:
     for name in names:
-        scene(10).tofile(tmp_path / f"{name}.bin")
+        (tmp_path / f"{name}.bin").touch()
     assert [len(part) for part in unbroken_recordings(named_frames([tmp_path]))] == lengths
 
 
 def test_names_that_are_numbers_give_the_order_where_no_times_do(tmp_path) -> None:
-    for number in range(4):
-        scene(10).tofile(tmp_path / f"{number:03d}.bin")
-    inorder = [tmp_path / f"{number:03d}.bin" for number in range(4)]
-    assert list(irregularities(named_frames(inorder), SEVERAL)) == []
-    assert list(irregularities(named_frames(inorder[::-1]), Window())) == []  # asks for one scan
-    (sentence,) = irregularities(named_frames(inorder[::-1]), SEVERAL)
+    paths = sorted(write_scenes(tmp_path, *4 * [10], name="{:03d}.bin").iterdir())
+    in_order, backwards = named_frames(paths), named_frames(paths[::-1])
+    assert list(irregularities(in_order, SEVERAL)) == []
+    assert list(irregularities(backwards, Window())) == []  # asks for one scan
+    (sentence,) = irregularities(backwards, SEVERAL)
     assert "002.bin: not later than the scan before it (3 scans in all)" in sentence
 
 
 def test_damaged_times_are_named_and_no_more(tmp_path) -> None:
-    for number in range(3):
-        scene(10).tofile(tmp_path / f"{number}.bin")
+    write_scenes(tmp_path, 10, 10, 10, name="{}.bin")
     (tmp_path / "times.txt").write_text("soon\n")
     (sentence,) = irregularities(named_frames([tmp_path]), SEVERAL)
     assert "0.bin: " in sentence
