@@ -26,16 +26,6 @@ def names(folder: Path) -> list[str]:
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
 
 
-def test_a_scan_and_its_labels_are_named_by_the_key(tmp_path) -> None:
-    write(tmp_path / "scans/1.bin")
-    (frame,) = named_frames([tmp_path / "scans"])
-    sink, rain = FolderSink(tmp_path / "out"), np.arange(30) < 4
-    sink.write(frame, frame.read().take(~rain), rain)
-    assert names(tmp_path / "out") == ["1.bin", "1.label"]
-    np.testing.assert_array_equal(read_labels(tmp_path / "out/1.label", 30), rain)
-    assert (tmp_path / "out/1.bin").read_bytes() == scene(30)[4:].tobytes()
-
-
 def test_a_scan_from_memory_is_written_as_a_pcd(tmp_path) -> None:
     (frame,) = Frames.of_scans([Scan.of(scene(30))])
     scan, sink = frame.read(), FolderSink(tmp_path)
@@ -72,10 +62,18 @@ def test_neither_scans_nor_labels_are_overwritten(tmp_path, out, reason) -> None
     FolderSink(tmp_path / "1/cleaned").refuse_clashes(source)
 
 
+def labelled(root: Path, *names: str, labels: str = "labels") -> Source:
+    paths = [root / name for name in names]
+    return frames_of(
+        paths,
+        lambda path: path.parent.parent / labels / f"{path.stem}.label",
+        ("x", "y", "z", "intensity"),
+        relative_keys(paths),
+    )
+
+
 def test_labels_that_a_frame_names_are_not_overwritten(tmp_path) -> None:
-    scan = tmp_path / "lidar/0.bin"
-    write(scan)
-    source = frames_of([scan], lambda scan: tmp_path / "truth/0.label", ("x", "y", "z", "i"))
+    source = labelled(tmp_path, "lidar/0.bin", labels="truth")
     with pytest.raises(InputError, match="holds the labels of"):
         FolderSink(tmp_path / "truth").refuse_clashes(source)
 
@@ -107,9 +105,8 @@ def test_one_scan_twice_is_refused_where_it_is_not_expected(tmp_path) -> None:
         FolderSink(tmp_path / "out", again=False).refuse_clashes(twice)
 
 
-def test_what_is_taken_away_goes_to_a_folder_of_its_own(tmp_path) -> None:
-    for sequence in "ab":
-        write(tmp_path / f"data/sequences/{sequence}/velodyne/0.bin")
+def test_scans_labels_and_what_is_taken_away_are_named_by_the_key(tmp_path) -> None:
+    write(*(tmp_path / f"data/sequences/{sequence}/velodyne/0.bin" for sequence in "ab"))
     source = named_frames([tmp_path / "data"])
     sink = FolderSink(tmp_path / "out", removed=tmp_path / "removed")
     sink.refuse_clashes(source)
@@ -117,8 +114,12 @@ def test_what_is_taken_away_goes_to_a_folder_of_its_own(tmp_path) -> None:
     for frame in source:
         scan = frame.read()
         sink.write(frame, scan.take(~rain), rain, scan.take(rain))
-    assert names(tmp_path / "removed") == ["a/velodyne/0.bin", "b/velodyne/0.bin"]
-    assert len(read_scan(tmp_path / "removed/b/velodyne/0.bin")) == 4
+    files = [f"{sequence}/velodyne/0{suffix}" for sequence in "ab" for suffix in (".bin", ".label")]
+    assert names(tmp_path / "out") == files
+    assert names(tmp_path / "removed") == files[::2]
+    np.testing.assert_array_equal(read_labels(tmp_path / "out" / files[1], 30), rain)
+    for folder, rows in (("out", ~rain), ("removed", rain)):
+        assert (tmp_path / folder / files[2]).read_bytes() == scene(30)[rows].tobytes()
 
 
 def test_what_is_taken_away_is_refused_where_it_would_take_a_place(tmp_path) -> None:
@@ -129,16 +130,6 @@ def test_what_is_taken_away_is_refused_where_it_would_take_a_place(tmp_path) -> 
         FolderSink(out, removed=tmp_path / "scans").refuse_clashes(source)
     with pytest.raises(InputError, match="where the cleaned scans go"):
         FolderSink(out, removed=tmp_path / "scans/../out").refuse_clashes(source)
-
-
-def labelled(root: Path, *names: str, labels: str = "labels") -> Source:
-    paths = [root / name for name in names]
-    return frames_of(
-        paths,
-        lambda path: path.parent.parent / labels / f"{path.stem}.label",
-        ("x", "y", "z", "intensity"),
-        relative_keys(paths),
-    )
 
 
 @pytest.mark.parametrize("own", ["a/0.label", "labels/0.label", "truth/0.label"])

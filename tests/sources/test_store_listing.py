@@ -51,19 +51,14 @@ def test_scans_have_the_keys_times_and_poses_that_they_have_in_a_folder(drives) 
         np.testing.assert_array_equal(here.pose, there.pose)
 
 
-def test_a_damaged_record_is_an_error_when_it_is_needed_and_names_its_url(drives) -> None:
-    last = frames_at([stored(drives)])[-1]
-    assert last.time is None
-    with pytest.raises(InputError) as caught:
-        assert last.pose
-    assert str(caught.value.subject) == "memory://bucket/drives/sequences/9/poses.txt"
-
-
-def test_a_damaged_scan_is_named_by_its_url(drives) -> None:
+def test_damage_is_an_error_when_it_is_needed_and_names_its_url(drives) -> None:
     (drives / "sequences/9/velodyne/11.bin").write_bytes(b"broken")
-    with pytest.raises(InputError) as caught:
-        frames_at([stored(drives)])[-2].read()
-    assert str(caught.value.subject) == "memory://bucket/drives/sequences/9/velodyne/11.bin"
+    frame = frames_at([stored(drives)])[-2]
+    assert frame.time is None
+    for need, file in ((lambda: frame.pose, "poses.txt"), (frame.read, "velodyne/11.bin")):
+        with pytest.raises(InputError) as caught:
+            need()
+        assert str(caught.value.subject) == f"memory://bucket/drives/sequences/9/{file}"
 
 
 def test_a_changed_record_changes_the_stamps_of_its_scans_alone(drives) -> None:

@@ -1,6 +1,7 @@
 """Sources in units: the union of units gives what one run gives, byte for byte."""
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,6 @@ from derain.sources.clean_sink import Destination
 from derain.sources.cleaned_bags import BagOptions
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
-from derain.sources.method import Method
 from derain.sources.recent_frames import FrameInWindow
 from derain.sources.source import Source
 from derain.sources.unit_cleaning import UnitCleaning
@@ -30,6 +30,8 @@ from derain.sources.weather_monitor import WeatherOptions
 from derain.views.window import Window
 
 SCANS = 7
+
+clean = partial(derain.clean, most_removed=1)
 
 
 @pytest.fixture
@@ -62,10 +64,8 @@ METHODS = {
 def test_the_union_of_units_is_what_one_run_gives(drive, tmp_path, method, block) -> None:
     source, every = derain.named_frames(drive), WeatherOptions(every_scan=True)
     reports = [
-        derain.clean(
-            source, METHODS[method](), tmp_path / name, most_removed=1, weather=every, division=each
-        )
-        for name, each in (("whole", None), ("units", Division(block, keep_records=True)))
+        clean(source, METHODS[method](), tmp_path / name, weather=every, division=division)
+        for name, division in (("whole", None), ("units", Division(block, keep_records=True)))
     ]
     assert contents(tmp_path / "whole") == contents(tmp_path / "units")
     assert len(contents(tmp_path / "whole")) == 2 * (2 * SCANS - 1)
@@ -80,35 +80,28 @@ def test_shares_and_workers_give_the_same_and_a_last_run_finds_everything_done(
     method = derain.FilterDerainer(derain.DROR(), threads=1)
     (drive / "sequences/first/velodyne/000003.bin").unlink()
     source = derain.named_frames(drive)
-    derain.clean(source, method, tmp_path / "whole", most_removed=1)
+    clean(source, method, tmp_path / "whole")
     for number in range(3):
-        share = Division(2, Shard(number, 3))
-        derain.clean(source, method, tmp_path / "shares", most_removed=1, division=share)
-    blocks = Division(2)
+        clean(source, method, tmp_path / "shares", division=Division(2, Shard(number, 3)))
     with WorkerPool(2) as pool:
-        derain.clean(
-            source, method, tmp_path / "workers", most_removed=1, division=blocks, executor=pool
-        )
+        clean(source, method, tmp_path / "workers", division=Division(2), executor=pool)
     assert contents(tmp_path / "whole") == contents(tmp_path / "shares")
     assert contents(tmp_path / "whole") == contents(tmp_path / "workers")
-    report = derain.clean(source, method, tmp_path / "shares", most_removed=1, division=blocks)
+    report = clean(source, method, tmp_path / "shares", division=Division(2))
     assert report.before == len(report.scans) == 2 * SCANS - 1
 
 
 class Failing(Between):
     """Sees some scans before and after, and fails at some by an error that does not name them."""
 
-    def __init__(self, past: int, delay: int, bad: frozenset[int]) -> None:
-        self.seen = Window(past, delay)
-        super().__init__()
-        self.bad = bad
+    window = Window()
 
-    @property
-    def window(self) -> Window:
-        return self.seen
+    def __init__(self, window: Window, bad: frozenset[int]) -> None:
+        self.window, self.bad = window, bad
+        super().__init__()
 
     def depends_on(self, recording: Sequence[Frame]) -> Window:
-        return self.seen
+        return self.window
 
     def _judged(self, ready: FrameInWindow) -> Judgement:
         if ready.frame.number in self.bad:
@@ -118,10 +111,9 @@ class Failing(Between):
 
 
 @pytest.fixture(scope="module")
-def standing() -> Source:
-    """A recording of a sensor that stands, in memory."""
-    scans = [derain.Scan.of(scene(60, seed=seed)) for seed in range(SCANS)]
-    return derain.Frames.of_scans(scans).map(lambda frame: frame.with_pose(np.eye(4)))
+def recording() -> Source:
+    """A recording in memory."""
+    return derain.Frames.of_scans([scene(60, seed=seed) for seed in range(SCANS)])
 
 
 @settings(max_examples=100)
@@ -132,13 +124,12 @@ def standing() -> Source:
     delay=st.integers(0, 2),
 )
 def test_each_scan_of_a_unit_has_one_outcome_whichever_fail(
-    standing, bad, block, past, delay
+    recording, bad, block, past, delay
 ) -> None:
-    method = Failing(past, delay, bad)
-    for unit in units_of(standing, method, block):
-        out = Destination("out", None, False, BagOptions())
-        judging = UnitCleaning(method, "", None, out, 1.0, None)
-        outcomes = list(judging.judged(unit))
+    method = Failing(Window(past, delay), bad)
+    out = Destination("out", None, False, BagOptions())
+    for unit in units_of(recording, method, block):
+        outcomes = list(UnitCleaning(method, "", None, out, 1.0, None).judged(unit))
         assert [frame for frame, _, _ in outcomes] == list(unit.frames)  # each when it is met
         errors = {frame: each for frame, each, _ in outcomes if isinstance(each, derain.InputError)}
         assert all(error.subject == frame.name for frame, error in errors.items())
@@ -150,26 +141,18 @@ def test_odometry_in_units_is_that_of_the_whole_source(drive, tmp_path) -> None:
     for poses in drive.rglob("poses.txt"):
         poses.unlink()
     source, method = derain.named_frames(drive), derain.PersistenceDerainer(threads=1)
-    every = WeatherOptions(every_scan=True)
+    out, every = tmp_path / "units", WeatherOptions(every_scan=True)
     before = with_poses(source, ODOMETRY, threads=1)
-    whole = derain.clean(before, method, tmp_path / "whole", most_removed=1, weather=every)
+    whole = clean(before, method, tmp_path / "whole", weather=every)
     assert any(one.number != other.number for one, other in zip(before, source, strict=True))
-    for division in (None, Division(2, keep_records=True), Division(2, keep_records=True)):
-        report = derain.clean(
-            source,
-            method,
-            tmp_path / "units",
-            placing=Odometry(threads=1),
-            most_removed=1,
-            weather=every,
-            division=division,
-        )
-        assert contents(tmp_path / "whole") == contents(tmp_path / "units")
+    units = Division(2, keep_records=True)
+    for each in (None, units, units):
+        report = clean(source, method, out, placing=Odometry(1), weather=every, division=each)
+        assert contents(tmp_path / "whole") == contents(out)
         assert [scan.weather for scan in report.scans] == [scan.weather for scan in whole.scans]
     assert report.before == SCANS  # and not those of the recording of which a scan failed
-    ungiven = Division(2, keep_records=True)
     with pytest.raises(derain.InputError, match="poses was found from the scans"):
-        derain.clean(source, method, tmp_path / "units", weather=every, division=ungiven)
+        clean(source, method, out, weather=every, division=units)
 
 
 def test_other_poses_are_other_inputs(drive) -> None:
@@ -185,23 +168,20 @@ def test_other_poses_are_other_inputs(drive) -> None:
     poses = next(drive.rglob("second/velodyne/poses.txt"))
     poses.write_text(poses.read_text() + "\n")
     after = inputs(derain.named_frames(drive))
-    assert [one != other for one, other in zip(before, after, strict=True)] == [
-        *[False] * 4,
-        *[True] * 4,
-    ]
+    changed = [one != other for one, other in zip(before, after, strict=True)]
+    assert changed == [*[False] * 4, *[True] * 4]
 
 
 @pytest.mark.parametrize("storage", ["mcap", "ros1"])
 def test_bags_in_units_are_those_of_one_run(tmp_path, storage) -> None:
     source = derain.named_frames(small_bag(tmp_path, storage))
     method = derain.FilterDerainer(derain.DROR(), threads=1)
-    derain.clean(source, method, tmp_path / "whole", most_removed=1)
+    division = Division(1, keep_records=True)
+    clean(source, method, tmp_path / "whole")
     with WorkerPool(1) as pool:
-        derain.clean(source, method, tmp_path / "units", most_removed=1, executor=pool)
+        clean(source, method, tmp_path / "units", division=division, executor=pool)
     assert contents(tmp_path / "whole") == contents(tmp_path / "units")
-    report = derain.clean(
-        source, method, tmp_path / "units", most_removed=1, division=Division(keep_records=True)
-    )
+    report = clean(source, method, tmp_path / "units", division=division)
     assert report.before == len(source)
 
 
@@ -220,13 +200,9 @@ def test_a_changed_scan_is_done_again_with_the_blocks_that_see_it(drive, tmp_pat
     (drive / "sequences/first/velodyne/000003.bin").unlink()
     method, division = derain.PersistenceDerainer(), Division(2, keep_records=True)
 
-    def run() -> derain.CleanReport:
-        source = derain.named_frames(drive)
-        return derain.clean(source, method, tmp_path / "out", most_removed=1, division=division)
-
-    first = run()
+    first = clean(derain.named_frames(drive), method, tmp_path / "out", division=division)
     scene(300, seed=5).tofile(drive / "sequences/second/velodyne/000002.bin")
-    again = run()
+    again = clean(derain.named_frames(drive), method, tmp_path / "out", division=division)
     assert len(first.scans) == len(again.scans) == 2 * SCANS - 1
     # Blocks 0-1 and 2-3 of the second recording: the first of them sees scan 2 as well.
     assert again.before == len(again.scans) - 4
@@ -236,12 +212,5 @@ def test_methods_that_find_poses_see_whole_recordings(drive) -> None:
     for poses in drive.rglob("poses.txt"):
         poses.unlink()
     source = derain.named_frames(drive)
-    placed: list[Method] = [derain.PersistenceDerainer(), RecordedDerainer(derain.Derainer())]
-    for method in placed:
+    for method in (derain.PersistenceDerainer(), RecordedDerainer(derain.Derainer())):
         assert [len(unit.frames) for unit in units_of(source, method, 2)] == [SCANS, SCANS]
-
-
-def test_a_bag_is_one_unit(tmp_path) -> None:
-    source = derain.named_frames(small_bag(tmp_path, "mcap"))
-    (unit,) = units_of(source, derain.FilterDerainer(derain.DROR()), block=1)
-    assert (unit.id, len(unit.frames)) == (source[0].key, len(source))
