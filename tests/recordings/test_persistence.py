@@ -70,19 +70,14 @@ def is_drop(scan: Scan) -> NDArray[np.bool_]:
     return np.arange(len(scan)) >= len(scan) - DROPS
 
 
-def recall_and_false(judgement: Judgement) -> tuple[float, float]:
-    drop = is_drop(judgement.scan)
-    return judgement.rain[drop].mean(), judgement.rain[~drop].mean()
-
-
 @pytest.mark.parametrize("posed", [True, False])
 def test_it_finds_drops_and_leaves_walls(posed) -> None:
     answers = judged(drive(posed=posed))
     assert [answer.frame.number for answer in answers if answer.frame] == [0, 1, 2, 3]
     for answer in answers:
-        recall, false = recall_and_false(answer)
-        assert recall > 0.8
-        assert false < 0.005
+        drop = is_drop(answer.scan)
+        assert answer.rain[drop].mean() > 0.8
+        assert answer.rain[~drop].mean() < 0.005
         assert answer.known.mean() > 0.9
         assert (answer.rain == (answer.probability > 0.5) & answer.known).all()
 
@@ -97,17 +92,12 @@ def test_of_a_scan_alone_nothing_is_known_and_nothing_is_taken() -> None:
 
 
 def test_no_evidence_is_taken_across_a_gap() -> None:
-    frames = drive(4)
-    far = [
-        *frames[:2],
-        MemoryFrame(key="2", number=2, scan=Scan.of(np.full((400, 3), 50.0) + np.eye(3)[0])),
-    ]
-    # The last scan has no pose, and its own odometry has nothing to go on from.
-    answers = judged(far)
-    alone = judged([far[1]])[0]
-    with_first = judged(far[:2])[1]
-    assert (answers[1].probability == with_first.probability).all()
-    assert not (answers[1].probability == alone.probability).all()
+    near = drive(2)
+    # This scan has no pose, and its own odometry has nothing to go on from.
+    far = MemoryFrame(key="2", number=2, scan=Scan.of(np.full((400, 3), 50.0) + np.eye(3)[0]))
+    (alone,), with_first, with_both = judged(near[1:]), judged(near)[1], judged([*near, far])[1]
+    assert (with_both.probability == with_first.probability).all()
+    assert not (with_both.probability == alone.probability).all()
 
 
 def test_a_registration_that_fails_is_warned_of() -> None:
@@ -175,7 +165,7 @@ def test_hard_cases_are_answered() -> None:
         ({"after": 51}, "after: 51 is not"),
         ({"sure": 0.5}, "sure: 0.5 is not"),
         ({"sure": "much"}, "sure: 'much' is not"),
-        ({"reach": 3}, "it has no parameter reach. It has before, after, sure."),
+        ({"reach": 3}, "it has no parameter reach"),
     ],
 )
 def test_wrong_parameters_are_refused(parameters, expected) -> None:

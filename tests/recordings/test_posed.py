@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from derain.files import write_scan
 from derain.recordings.odometry import FrameOdometry, Registration, shift_of
 from derain.recordings.posed import with_poses
 from derain.scan import Scan
+from derain.sources.file_frame import FileFrame
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame, MemoryFrame
 from derain.sources.source import Frames
@@ -59,17 +61,11 @@ def test_each_recording_starts_at_the_identity(drive) -> None:
         np.testing.assert_array_equal(posed[number].pose, posed[number + 4].pose)
 
 
-class Broken(MemoryFrame):
-    """A scan that cannot be read."""
-
-    def read(self) -> Scan:
-        raise InputError(self.name, "is damaged", "Record it again.")
-
-
 @pytest.mark.parametrize("unread", [True, False])
 def test_no_window_reaches_over_a_scan_that_cannot_be_registered(drive, unread) -> None:
-    blind = replace(drive[1], scan=Scan.of(np.zeros((0, 3))))
-    bad = Broken(**vars(blind)) if unread else blind
+    bad = replace(drive[1], scan=Scan.of(np.zeros((0, 3))))
+    if unread:
+        bad = FileFrame(key="1", sequence="drive", number=1, path=Path("absent.bin"))
     reasons: list[str] = []
     posed = with_poses(
         [drive[0], bad, *drive[2:]],
@@ -79,9 +75,7 @@ def test_no_window_reaches_over_a_scan_that_cannot_be_registered(drive, unread) 
     following = [later.follows(earlier) for earlier, later in pairwise(posed)]
     assert following == [False, False, True]
     assert posed[3].pose[0, 3] == pytest.approx(1.3, abs=0.1)
-    assert reasons[1] == (
-        "it cannot be read" if unread else "the scan has only 0 surfaces in reach"
-    )
+    assert ("cannot be read" if unread else "only 0 surfaces in reach") in reasons[1]
 
 
 def test_a_scan_taken_before_the_one_that_it_follows_is_not_trusted(drive) -> None:
@@ -92,7 +86,7 @@ def test_a_scan_taken_before_the_one_that_it_follows_is_not_trusted(drive) -> No
         for frame, time in zip(drive, times, strict=True)
     ]
     assert [each.trusted for each in found] == [True, True, False, False]
-    assert found[2].reason == ("it was taken at 0.100 s, the scan before at 0.100 s: out of order")
+    assert "at 0.100 s, the scan before at 0.100 s" in found[2].reason
 
 
 def test_poses_of_a_file_go_line_by_line_or_by_number(drive, tmp_path) -> None:

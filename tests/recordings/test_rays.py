@@ -18,6 +18,8 @@ from derain.recordings.rays import (
     ray_evidence,
 )
 
+from .street import motion
+
 # A quarter of a degree, as far as the rays of many sensors lie apart.
 STEP = np.radians(0.25)
 
@@ -29,13 +31,6 @@ def wall(distance: float, rows: int = 24, columns: int = 40) -> NDArray[np.float
     )
     y, z = np.tan(azimuth.ravel()), np.tan(inclination.ravel()) / np.cos(azimuth.ravel())
     return distance * np.stack([np.ones_like(y), y, z], axis=1)
-
-
-def moved(x: float, yaw: float = 0.0) -> NDArray[np.float64]:
-    motion = np.eye(4)
-    motion[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
-    motion[0, 3] = x
-    return motion
 
 
 def test_rays_end_at_a_wall_and_go_through_a_drop_before_it() -> None:
@@ -66,8 +61,8 @@ def test_it_is_what_a_search_of_every_ray_finds(seed) -> None:
         wall(generator.uniform(5, 30), 6, 8) * generator.uniform(0.97, 1.03, (48, 1))
         for _ in range(2)
     ]
-    motion, other = moved(*generator.uniform(-0.05, 0.05, 2)), clouds[1]
-    places = clouds[0] @ motion[:3, :3].T + motion[:3, 3]
+    moved, other = motion(generator.uniform(-0.05, 0.05), yaw=generator.uniform(-3, 3)), clouds[1]
+    places = clouds[0] @ moved[:3, :3].T + moved[:3, 3]
     evidence = ray_evidence(places, Rays(other, 1), STEP)
     within = max(np.radians(WITHIN), WITHIN_STEPS * STEP)
     for number, place in enumerate(places):

@@ -4,6 +4,7 @@ import gc
 import weakref
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from derain.export.runtime import Derainer
 from derain.files.extrinsics import Extrinsics
 from derain.recordings.rays import RayEvidence
 from derain.scan import Scan
+from derain.sources.file_frame import FileFrame
 from derain.sources.frame import MemoryFrame
 from derain.sources.judgement import Judgement
 from derain.sources.judging import Failures, judgements
@@ -36,13 +38,6 @@ class Doubtful(Derainer):
         doubted = is_drop(points) | (np.arange(len(points)) % 10 == 0)
         probability = np.where(doubted, np.float32(0.3), np.float32(0.001))
         return Judgement(probability, probability > 0.4, points.valid, points)
-
-
-class Unreadable(MemoryFrame):
-    """A frame whose file is damaged."""
-
-    def read(self) -> Scan:
-        raise InputError(self.name, "is damaged", "Give another.")
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +94,7 @@ def test_a_scan_that_is_there_twice_is_reported_and_one_of_which_nothing_is_know
 def test_scans_beside_one_that_fails_are_judged_without_it(model, posed, wrong) -> None:
     first, beside, last = drive(3, posed=posed)
     broken = {
-        "unreadable": Unreadable(key=beside.key, number=1, scan=beside.scan),
+        "unreadable": FileFrame(key=beside.key, number=1, path=Path("absent.bin")),
         "empty": replace(beside, scan=Scan.of(np.zeros((0, 4)))),
         "nothing but NaN": replace(beside, scan=Scan.of(np.full((50, 4), np.nan))),
         "makes it fail": replace(beside, scan=replace(beside.scan, name=FAILS)),
