@@ -26,8 +26,7 @@ class Defects(Settings):
     """The defects of a sensor's scans; none by default.
 
     Attributes:
-        SUBJECT = "defects"
-    dropped: Share of the returns that are lost, each by itself.
+        dropped: Share of the returns that are lost, each by itself.
         dropped_rows: Share of the rows of beams that are lost, anew in each scan.
         dropped_sectors: Share of the sectors, all columns sent in a sixtieth of a scan, that are
             lost, anew in each scan.

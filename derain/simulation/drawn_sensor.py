@@ -37,8 +37,7 @@ class DefectSpans(Spans):
     """The ranges that defects of sensors are drawn from; shares are drawn evenly.
 
     Attributes:
-        SUBJECT = "defect spans"
-    none: Share of the sensors without any.
+        none: Share of the sensors without any.
         each: Probability of each defect in the others.
         dropped: See :class:`derain.simulation.defects.Defects`, as for all that follow.
         dropped_rows: Likewise.
