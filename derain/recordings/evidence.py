@@ -139,18 +139,6 @@ def surroundings_features(points: ScanPoints) -> NDArray[np.float64]:
     )
 
 
-def surroundings_log_odds(points: ScanPoints) -> NDArray[np.float64]:
-    """Log-odds of rain by each point's surroundings alone, float64 (M,)."""
-    log_odds: NDArray[np.float64] = surroundings_features(points) @ np.array(SURROUNDINGS_WEIGHTS)
-    return log_odds
-
-
-def ray_log_odds(evidence: RayEvidence) -> NDArray[np.float64]:
-    """Log-odds of rain by the rays of other scans alone, float64 (M,)."""
-    any_point, ending, through = RAY_WEIGHTS
-    return any_point + ending * evidence.ending + through * evidence.through
-
-
 def combined_log_odds(points: ScanPoints, evidence: RayEvidence | None) -> NDArray[np.float64]:
     """Log-odds of rain of each point without its neighbours' votes, float64 (M,).
 
@@ -158,8 +146,13 @@ def combined_log_odds(points: ScanPoints, evidence: RayEvidence | None) -> NDArr
         points: M points of a scan.
         evidence: That of the rays of other scans; None where there is no other scan.
     """
-    alone = surroundings_log_odds(points)
-    return alone if evidence is None else alone + ray_log_odds(evidence) - PRIOR
+    by_surroundings: NDArray[np.float64]
+    by_surroundings = surroundings_features(points) @ np.array(SURROUNDINGS_WEIGHTS)
+    if evidence is None:
+        return by_surroundings
+    any_point, ending, through = RAY_WEIGHTS
+    by_rays = any_point + ending * evidence.ending + through * evidence.through
+    return by_surroundings + by_rays - PRIOR
 
 
 def vote(points: ScanPoints, log_odds: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,6 +1,7 @@
 """One scan in its sequence: its properties before it is read."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
@@ -254,6 +255,16 @@ class MemoryFrame(Frame):
     def without_labels(self) -> Self:
         """The same frame without its labels."""
         return replace(self, label_path=None, reads_labels=False)
+
+
+def times_of(frames: Sequence[Frame]) -> list[float] | None:
+    """Times at which frames were taken, seconds; None unless all are known.
+
+    Raises:
+        InputError: A record of times that is damaged or does not fit the scans.
+    """
+    times = [time for frame in frames if (time := frame.time) is not None]
+    return times if len(times) == len(frames) else None
 
 
 def time_of(frame: Frame) -> float | None:

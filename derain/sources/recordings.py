@@ -9,7 +9,7 @@ from itertools import pairwise
 from derain.errors import InputError
 from derain.files.names import scan_stem
 from derain.sources.file_frame import FileFrame
-from derain.sources.frame import Frame
+from derain.sources.frame import Frame, times_of
 from derain.views.window import Window
 
 # Seconds. Sensors take ten or twenty scans per second. In more than one second, a car drives so far
@@ -77,7 +77,7 @@ def irregularities(frames: Iterable[Frame], window: Window) -> Iterator[str]:
 def _unbroken(recording: Sequence[Frame]) -> list[list[Frame]]:
     """Divides a recording where there is a break in time."""
     try:
-        times = _times(recording)
+        times = times_of(recording)
     except InputError:
         times = None
     places = times or _numbers(recording)
@@ -97,7 +97,7 @@ def _unbroken(recording: Sequence[Frame]) -> list[list[Frame]]:
 def _irregular_steps(recording: Sequence[Frame]) -> Iterator[str]:
     """Describes the first step in time of each kind that harms the method."""
     try:
-        times = _times(recording)
+        times = times_of(recording)
     except InputError as error:  # the method may not need times
         yield f"{recording[0].name}: its time is not known: {error}"
         return
@@ -116,12 +116,6 @@ def _irregular_steps(recording: Sequence[Frame]) -> Iterator[str]:
             f"{apart[0].name}: more than {LONGEST_STEP:g} s after the scan before it "
             f"({_scans(len(apart))} in all): such scans have little in common"
         )
-
-
-def _times(recording: Sequence[Frame]) -> list[float] | None:
-    """Times of the scans, seconds; None unless all are known."""
-    times = [time for frame in recording if (time := frame.time) is not None]
-    return times if len(times) == len(recording) else None
 
 
 def _numbers(recording: Sequence[Frame]) -> list[int] | None:

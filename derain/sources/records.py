@@ -16,7 +16,7 @@ from derain.files import find_scans
 from derain.files.frame_times import METADATA, read_frame_times
 from derain.files.names import scan_stem
 from derain.files.reading import is_file, stamp_of
-from derain.sources.frame import Frame
+from derain.sources.frame import Frame, times_of
 from derain.sources.number_lines import read_numbers
 from derain.sources.trajectory import CALIBRATION, Trajectory, read_trajectory
 
@@ -124,8 +124,8 @@ def poses_along(
     """
     names = [Path(frame.name).name for frame in recording]
     if trajectory.times is not None:  # else the scans' own are not read, damaged or not
-        times = [time for frame in recording if (time := frame.time) is not None]
-        if len(times) == len(recording) and trajectory.is_by_time(times):
+        times = times_of(recording)
+        if times is not None and trajectory.is_by_time(times):
             yield from map(trajectory.at, times, names)
             return
     for place, name in enumerate(names):
