@@ -17,7 +17,6 @@ from derain.models.base import DerainingModule
 from derain.models.outdet import OutDet
 from derain.scan import Scan
 from derain.spec import Spec
-from derain.views.neighbours import NeighbourView
 
 
 def randomise(network: nn.Module, seed: int) -> None:
@@ -64,20 +63,6 @@ def outdet() -> Callable[..., OutDet]:
 
 
 @pytest.fixture
-def sample() -> Callable[..., Sample]:
-    """Views a scan or an array of points, with a random truth or one class for all."""
-
-    def view(points: Scan | np.ndarray, neighbours: int = 9, rain: float = 0.3) -> Sample:
-        scan = Scan.of(points)
-        truth = np.random.default_rng(len(scan)).random(len(scan)) < rain
-        neighbourhoods = NeighbourView(neighbours, threads=1)(scan)
-        target = torch.from_numpy(neighbourhoods.target(truth))
-        return Sample(scan.with_label(truth.astype(np.int64)), neighbourhoods, target)
-
-    return view
-
-
-@pytest.fixture
 def image_network(small_grid) -> Callable[..., Any]:
     """Makes a small SalsaNext or LiSnowNet in evaluation mode, of random weights, as for WADS."""
 
@@ -91,15 +76,15 @@ def image_network(small_grid) -> Callable[..., Any]:
 
 
 @pytest.fixture
-def image_sample() -> Callable[..., Sample]:
+def sample() -> Callable[..., Sample]:
     """Views a scan as a model does, with a random truth or one class for all."""
 
     def view(model: DerainingModule, points: Scan | np.ndarray, rain: float = 0.3) -> Sample:
         scan = Scan.of(points)
         truth = np.random.default_rng(len(scan)).random(len(scan)) < rain
-        image = model.spec.make_view()(scan)
+        seen = model.spec.make_view()(scan)
         labelled = scan.with_label(np.where(truth, 110, 0))
-        return Sample(labelled, image, torch.from_numpy(image.target(truth)))
+        return Sample(labelled, seen, torch.from_numpy(seen.target(truth)))
 
     return view
 

@@ -1,4 +1,4 @@
-"""Networks on range images alike: their grid, empty pixels, batches, and as they are exported."""
+"""Networks on range images alike: their grid, empty pixels, and as they are exported."""
 
 import pytest
 import torch
@@ -6,7 +6,7 @@ import torch
 from derain.cards.card import load_card
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
-from derain.learning.batch import Batch, Sample
+from derain.learning.batch import Batch
 from derain.models.lisnownet import LiSnowNet
 from derain.models.salsanext import SalsaNext
 from derain.models.salsanext_lite import SalsaNextLite
@@ -71,10 +71,10 @@ def test_a_view_that_there_is_not_is_refused(model_class, arguments, reason) -> 
 @pytest.mark.parametrize("content", [0.0, -1.0, 1e6, torch.nan])
 @torch.no_grad()
 def test_what_empty_pixels_hold_does_not_matter(
-    image_network, image_sample, model_class, content
+    image_network, sample, model_class, content
 ) -> None:
     model = image_network(model_class)
-    inputs = Batch.of([image_sample(model, scene())]).inputs
+    inputs = Batch.of([sample(model, scene())]).inputs
     image, valid = inputs["image"], inputs["valid"]
     assert 0.1 < valid.float().mean() < 0.9
     changed = model(torch.where(valid, image, content), valid)
@@ -84,25 +84,9 @@ def test_what_empty_pixels_hold_does_not_matter(
 
 @all_models
 @torch.no_grad()
-def test_packed_scans_get_the_logits_they_get_alone(
-    image_network, image_sample, model_class
-) -> None:
-    model = image_network(model_class).double()
-    samples = [image_sample(model, scene(points, points)) for points in (300, 0, 7, 3000)]
-
-    def logits_of(*together: Sample) -> torch.Tensor:
-        inputs = Batch.of(together).inputs
-        return model(inputs["image"].double(), inputs["valid"])
-
-    for logits, own in zip(Batch.of(samples).split(logits_of(*samples)), samples, strict=True):
-        torch.testing.assert_close(logits, logits_of(own), atol=1e-8, rtol=1e-8)
-
-
-@all_models
-@torch.no_grad()
-def test_the_deployed_network_computes_the_same(image_network, image_sample, model_class) -> None:
+def test_the_deployed_network_computes_the_same(image_network, sample, model_class) -> None:
     model = image_network(model_class)
-    inputs = Batch.of([image_sample(model, scene())]).inputs
+    inputs = Batch.of([sample(model, scene())]).inputs
     # Where a BatchNorm is folded into its convolution, sums are rounded elsewhere.
     rounding = 1e-4 if model_class is SalsaNextLite else 0
     deployed, trained = model.deployed()(**inputs), model(**inputs)

@@ -122,11 +122,9 @@ def test_the_probability_rises_with_the_residual() -> None:
 
 
 @torch.no_grad()
-def test_the_model_applies_its_rule_to_what_the_network_changed(
-    image_network, image_sample
-) -> None:
+def test_the_model_applies_its_rule_to_what_the_network_changed(image_network, sample) -> None:
     model = image_network(LiSnowNet, rule={"residual": 1.0, "near": 6.0})
-    one = image_sample(model, scene())
+    one = sample(model, scene())
     inputs = Batch.of([one]).inputs
     image = inputs["image"][0].double().numpy()
     share = np.clip(image[2] / 255, 0, 1)
@@ -148,10 +146,10 @@ def test_the_residual_is_l1_unless_another_norm_is_named() -> None:
 @torch.no_grad()
 @pytest.mark.parametrize(("alpha", "beta", "norm"), [(5.5, 0.5, "l1"), (3.0, 0.2, "l2")])
 def test_the_losses_are_those_of_what_the_network_saw(
-    image_network, image_sample, alpha, beta, norm
+    image_network, sample, alpha, beta, norm
 ) -> None:
     model = image_network(LiSnowNet, alpha=alpha, beta=beta, norm=norm)
-    batch = Batch.of([image_sample(model, scene(3000, seed)) for seed in range(2)])
+    batch = Batch.of([sample(model, scene(3000, seed)) for seed in range(2)])
     losses, logits = model.losses(batch)
     image, valid = batch.inputs["image"], batch.inputs["valid"]
     seen = torch.stack([image[:, 0], (image[:, 2] / 255).clamp(0, 1)], dim=1).pow(1 / 3)
@@ -165,13 +163,13 @@ def test_the_losses_are_those_of_what_the_network_saw(
 
 @pytest.mark.parametrize("prefix", ["", "module."])
 @torch.no_grad()
-def test_published_weights_are_taken_over(image_network, image_sample, prefix) -> None:
+def test_published_weights_are_taken_over(image_network, sample, prefix) -> None:
     own = image_network(LiSnowNet)
     weights = {prefix + key: tensor for key, tensor in published(own.network).items()}
     model = LiSnowNet.from_published(weights, WADS, "wads").eval()
     assert (model.hparams["width"], model.spec.data) == (4, "WADS")
     assert model.spec.view["grid"] == grid_of("wads", "").as_dict()
-    inputs = Batch.of([image_sample(own, scene())]).inputs
+    inputs = Batch.of([sample(own, scene())]).inputs
     seen = cube_roots(inputs["image"], SelectionRule(full_scale=255.0))
     assert torch.equal(model.network(seen, inputs["valid"]), own.network(seen, inputs["valid"]))
     # The rule is not in the weights: its constants are those of the default.

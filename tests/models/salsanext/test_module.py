@@ -49,14 +49,14 @@ def test_the_spec_holds_how_the_network_is_used() -> None:
 @pytest.mark.parametrize("prefix", ["", "module."])
 @torch.no_grad()
 def test_published_weights_give_the_logits_of_the_network_on_normalised_images(
-    image_network, image_sample, small_grid, prefix
+    image_network, sample, small_grid, prefix
 ) -> None:
     network = image_network(SalsaNext).network
     weights = {prefix + key: tensor for key, tensor in published(network).items()}
     model = SalsaNext.from_published(weights, WADS, "semantickitti").eval()
     assert (model.spec.data, model.hparams["width"]) == ("WADS", 4)
     assert model.spec.view["grid"] == grid_of("semantickitti", "").as_dict()
-    inputs = Batch.of([image_sample(image_network(SalsaNext), scene())]).inputs
+    inputs = Batch.of([sample(image_network(SalsaNext), scene())]).inputs
     image = np.empty((1, 5, 18, 60), np.float32)
     for channel, (mean, std) in enumerate(zip((26.6, *WADS.mean), (19.7, *WADS.std), strict=True)):
         image[0, channel] = (inputs["image"][0, channel].numpy() - mean) / std

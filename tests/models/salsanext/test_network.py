@@ -10,6 +10,7 @@ from torch import Tensor, nn
 from torch.nn.functional import cross_entropy
 
 from derain.errors import InputError
+from derain.models.layers.batch_norm import PixelBatchNorm
 from derain.models.salsanext.network import PUBLISHED_KEYS, SalsaNextNetwork, SalsaNextPlan
 from derain.models.salsanext_lite import SalsaNextLiteNetwork
 
@@ -83,10 +84,13 @@ def test_weights_of_another_network_are_refused(change, reason) -> None:
         SalsaNextNetwork.from_published(state_dict)
 
 
-@pytest.mark.parametrize("width", [-2, 0, 1, 31])
-def test_a_width_that_cannot_be_halved_is_refused(width) -> None:
-    with pytest.raises(InputError, match=f"width: {width} is not"):
-        SalsaNextNetwork(width=width)
+@pytest.mark.parametrize(
+    ("kind", "widths"), [(SalsaNextNetwork, (-2, 0, 1, 31)), (SalsaNextLiteNetwork, (-2, 0))]
+)
+def test_a_width_of_nothing_or_that_cannot_be_halved_is_refused(kind, widths) -> None:
+    for width in widths:
+        with pytest.raises(InputError, match=f"width: {width} is not"):
+            kind(width=width)
 
 
 def test_the_exported_network_spends_nothing_on_sizes_that_fit() -> None:
@@ -130,6 +134,18 @@ def test_an_image_of_any_size_counts_as_continued_by_empty_pixels(kind, height, 
     logits = network(seen)
     assert logits.shape == (1, 2, height, width)
     torch.testing.assert_close(logits, network(padded)[..., :height, :width], rtol=0, atol=0)
+
+
+@torch.no_grad()
+def test_the_lite_network_folds_to_one_that_computes_the_same_without_a_batch_norm() -> None:
+    network, seen = random_one(SalsaNextLiteNetwork, width=8), image(32, 64)
+    kept = {name: tensor.clone() for name, tensor in network.state_dict().items()}
+    folded = network.folded()
+    assert not any(isinstance(layer, PixelBatchNorm) for layer in folded.modules())
+    torch.testing.assert_close(folded(seen), network(seen), rtol=1e-4, atol=1e-5)
+    # The one that goes on being trained is left as it was.
+    assert network.state_dict().keys() == kept.keys()
+    assert all(torch.equal(network.state_dict()[name], kept[name]) for name in kept)
 
 
 @both
