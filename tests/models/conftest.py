@@ -1,17 +1,19 @@
 """What the tests of models share."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, TypeVar
 
 import lightning
 import numpy as np
 import pytest
 import torch
-from torch import nn
+from recorded_scenes import write_scenes
+from torch import Tensor, nn
 
 from derain.cards.card import load_card
+from derain.datamodules.base import Loading
+from derain.datamodules.folder import Folder
 from derain.datamodules.in_memory import InMemory
-from derain.datamodules.scan_data import Loading
 from derain.learning.batch import Sample
 from derain.models.base import DerainingModule
 from derain.models.outdet import OutDet
@@ -107,17 +109,35 @@ def make_trainer() -> Iterator[Callable[..., lightning.Trainer]]:
     torch.use_deterministic_algorithms(False)
 
 
+def assert_same(one: Mapping[str, Tensor], other: Mapping[str, Tensor]) -> None:
+    """Asserts that two mappings hold the same tensors; what is undefined is so in both."""
+    assert one.keys() == other.keys()
+    for name, value in one.items():
+        assert torch.equal(value.nan_to_num(-1), other[name].nan_to_num(-1)), name
+
+
+@pytest.fixture
+def scenes(tmp_path) -> Callable[..., Folder]:
+    """Makes a data module of four small labelled scenes, three of which are trained on."""
+
+    def make(card: str = "simulated", **loading: Any) -> Folder:
+        write_scenes(tmp_path, *4 * [300], name="{}.bin", rain=load_card(card).rain[0])
+        parts = {"train": ["[012].bin"], "validation": ["3.bin"], "test": ["3.bin"]}
+        return Folder(str(tmp_path), card, **parts, loading=Loading(**loading))
+
+    return make
+
+
 Trained = TypeVar("Trained", bound=DerainingModule)
 
 
-def trained_on_scenes(make: Callable[[], Trained], labelled: Callable[[int], Scan]) -> Trained:
+def trained_on_scenes(
+    trainer: lightning.Trainer, make: Callable[[], Trained], labelled: Callable[[int], Scan]
+) -> Trained:
     """Trains a model on a few labelled scenes of WADS's classes."""
     lightning.seed_everything(0)
     model = make()
     train, validation = [labelled(seed) for seed in range(4)], [labelled(9)]
     data = InMemory(train, validation, card="wads", loading=Loading(batch_size=2))
-    trainer = lightning.Trainer(
-        max_epochs=25, logger=False, enable_progress_bar=False, enable_checkpointing=False
-    )
     trainer.fit(model, data)
     return model.eval()

@@ -38,9 +38,9 @@ def labelled(seed: int, drops: int = 300, gain: float = 1.0) -> Scan:
 
 
 @pytest.fixture(scope="module")
-def trained() -> CueFusion:
+def trained(make_trainer) -> CueFusion:
     """Trained on a few scenes."""
-    return trained_on_scenes(lambda: CueFusion(learning_rate=1e-2), labelled)
+    return trained_on_scenes(make_trainer(25), lambda: CueFusion(learning_rate=1e-2), labelled)
 
 
 @pytest.fixture(scope="module")

@@ -123,9 +123,9 @@ def labelled(seed: int, drops: int = 300) -> Scan:
 
 
 @pytest.fixture(scope="module")
-def trained() -> RelativeOutDet:
+def trained(make_trainer) -> RelativeOutDet:
     """Trained on a few scenes."""
-    return trained_on_scenes(lambda: RelativeOutDet(learning_rate=1e-2), labelled)
+    return trained_on_scenes(make_trainer(25), lambda: RelativeOutDet(learning_rate=1e-2), labelled)
 
 
 def test_it_learns_drops_and_is_blind_to_intensity(trained, tmp_path, monkeypatch) -> None:
@@ -166,14 +166,14 @@ def test_too_small_a_neighbourhood_is_refused() -> None:
         RelativeOutDet(neighbours=3)
 
 
-def test_a_training_of_one_cycle_goes_on_with_steps_of_as_many_scans_alone(tmp_path) -> None:
+def test_a_training_of_one_cycle_goes_on_with_steps_of_as_many_scans_alone(
+    make_trainer, tmp_path
+) -> None:
     scans = [labelled(seed) for seed in range(2)]
 
     def fit(batch_size: int, checkpoint: Path | None = None) -> lightning.Trainer:
         every = ModelCheckpoint(tmp_path, filename="{epoch}", save_top_k=-1)
-        trainer = lightning.Trainer(
-            max_epochs=2, callbacks=[every], logger=False, enable_progress_bar=False
-        )
+        trainer = make_trainer(2, callbacks=[every], enable_checkpointing=True)
         data = InMemory(scans, scans, card="wads", loading=Loading(batch_size=batch_size))
         trainer.fit(RelativeOutDet(), data, ckpt_path=checkpoint)
         return trainer

@@ -1,7 +1,7 @@
 """A training that begins from a trained model starts with its answers."""
 
+from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import lightning
 import numpy as np
@@ -38,20 +38,19 @@ def data(card: DataCard, first: int, shift: float = 0.0) -> InMemory:
     return InMemory(*([scan.with_label(label) for scan in scans],) * 3, card=card)
 
 
-def trained(model: DerainingModule, card: DataCard, first: int, path: Path) -> DerainingModule:
-    """A model that has learnt a little, with its Spec."""
-    lightning.seed_everything(first)
-    run = lightning.Trainer(
-        max_epochs=2,
-        accelerator="cpu",
-        logger=False,
-        enable_progress_bar=False,
-        enable_checkpointing=False,
-        enable_model_summary=False,
-    )
-    run.fit(model, data(card, first))
-    save_model(model, path)
-    return load_model(path)
+@pytest.fixture
+def trained(make_trainer, tmp_path) -> Callable[..., DerainingModule]:
+    """Has a model learn a little, and saves it with its Spec."""
+
+    def train(
+        model: DerainingModule, card: DataCard = FIRST, first: int = 0, name: str = "start.ckpt"
+    ) -> DerainingModule:
+        lightning.seed_everything(first)
+        make_trainer(epochs=2).fit(model, data(card, first))
+        save_model(model, tmp_path / name)
+        return load_model(tmp_path / name)
+
+    return train
 
 
 MODELS = {
@@ -61,9 +60,9 @@ MODELS = {
 
 
 @pytest.mark.parametrize("kind", MODELS)
-def test_the_first_logits_are_those_of_the_start(kind, tmp_path) -> None:
+def test_the_first_logits_are_those_of_the_start(kind, trained, tmp_path) -> None:
     first, recipe = MODELS[kind]
-    source = trained(first, FIRST, 0, tmp_path / "start.ckpt")
+    source = trained(first)
     student = started(recipe, tmp_path / "start.ckpt", "mine")
     # Other scans with other statistics, which would normalise the input in another way.
     own = data(OTHER, 10, shift=3.0)
@@ -84,8 +83,8 @@ def test_the_first_logits_are_those_of_the_start(kind, tmp_path) -> None:
         assert student.hparams.get(argument) == recipe.hparams.get(argument)
 
 
-def test_the_record_names_what_it_began_from_and_all_that_both_have_seen(tmp_path) -> None:
-    source = trained(OutDet(neighbours=3), FIRST, 0, tmp_path / "one.ckpt")
+def test_the_record_names_what_it_began_from_and_all_that_both_have_seen(trained, tmp_path) -> None:
+    source = trained(OutDet(neighbours=3), name="one.ckpt")
     student = started(OutDet(), tmp_path / "one.ckpt", "one")
     (one,) = agree_on_task(student, data(OTHER, 10)).spec.training[STARTED_FROM]
     assert one.startswith("one (")
@@ -100,16 +99,16 @@ def test_the_record_names_what_it_began_from_and_all_that_both_have_seen(tmp_pat
     assert len(last.training["scans"]) == 9
 
 
-def test_a_student_that_is_read_back_is_as_it_was(tmp_path) -> None:
-    trained(OutDet(neighbours=4, channels=("range",)), FIRST, 0, tmp_path / "start.ckpt")
+def test_a_student_that_is_read_back_is_as_it_was(trained, tmp_path) -> None:
+    trained(OutDet(neighbours=4, channels=("range",)))
     student = started(OutDet(learning_rate=0.02), tmp_path / "start.ckpt", "mine")
-    again = trained(student, OTHER, 10, tmp_path / "student.ckpt")
+    again = trained(student, OTHER, 10, "student.ckpt")
     assert again.hparams["neighbours"] == 4
     assert again.hparams["learning_rate"] == 0.02
     assert again.spec == student.spec
 
 
-def test_it_starts_from_a_model_of_its_own_kind_alone(tmp_path) -> None:
-    trained(OutDet(neighbours=3), FIRST, 0, tmp_path / "start.ckpt")
+def test_it_starts_from_a_model_of_its_own_kind_alone(trained, tmp_path) -> None:
+    trained(OutDet(neighbours=3))
     with pytest.raises(InputError, match="a model of outdet, from which salsanext cannot start"):
         started(SalsaNext(), tmp_path / "start.ckpt", "mine")

@@ -1,13 +1,13 @@
 """A network is trained and measured alike on files, on scans in memory and by plain loaders."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 
 import lightning
 import numpy as np
 import pytest
 import torch
-from torch import Tensor
+from recorded_scenes import write_scenes
 from torch.utils.data import DataLoader
 
 from derain.datamodules.base import Loading
@@ -17,8 +17,6 @@ from derain.datamodules.loader import scan_loader
 from derain.datamodules.scan_check import ScanCheck
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
-from derain.files import read_scan
-from derain.files.labels import write_labels
 from derain.learning.task import agree_on_task
 from derain.models.base import DerainingModule
 from derain.models.callbacks.panels import ScanPanels
@@ -27,11 +25,10 @@ from derain.models.lisnownet import LiSnowNet
 from derain.models.outdet import OutDet
 from derain.scan import Scan
 
+from .conftest import assert_same
 from .two_processes import GRID, NETWORKS
 
 SNOW = 110
-SCANS = 4
-TRAINED, VALIDATED, TESTED = range(3), (3,), (2, 3)
 LOADING = Loading(batch_size=2)
 
 
@@ -48,31 +45,17 @@ def network(request) -> Callable[[], DerainingModule]:
 
 @pytest.fixture
 def files(tmp_path) -> Folder:
-    for number in range(SCANS):
-        scene(300, seed=number).tofile(tmp_path / f"{number}.bin")
-        write_labels(tmp_path / f"{number}.label", SNOW * (np.arange(300) % 7 == 0))
+    write_scenes(tmp_path, *4 * [300], name="{}.bin", rain=SNOW)
     parts = {"train": ["[012].bin"], "validation": ["3.bin"], "test": ["[23].bin"]}
     return Folder(str(tmp_path), "wads", **parts, loading=LOADING)
 
 
 @pytest.fixture
-def scans(files) -> list[Scan]:
+def memory(files) -> InMemory:
     """What the files hold."""
-    label = SNOW * (np.arange(300) % 7 == 0)
-    paths = [files.root / f"{number}.bin" for number in range(SCANS)]
-    return [read_scan(path).with_label(label.astype(np.int64)) for path in paths]
-
-
-@pytest.fixture
-def memory(scans) -> InMemory:
-    train, validation, test = ([scans[n] for n in part] for part in (TRAINED, VALIDATED, TESTED))
-    return InMemory(train, validation, test, card="wads", loading=LOADING)
-
-
-def assert_same(one: Mapping[str, Tensor], other: Mapping[str, Tensor]) -> None:
-    assert one.keys() == other.keys()
-    for name, value in one.items():
-        assert torch.equal(value.nan_to_num(-1), other[name].nan_to_num(-1)), name
+    parts = ("train", "validation", "test")
+    scans = ([files.read(frame) for frame in files.frames(part)] for part in parts)
+    return InMemory(*scans, card="wads", loading=LOADING)
 
 
 def test_files_memory_and_plain_loaders_train_the_same_network(
@@ -111,7 +94,7 @@ def test_files_memory_and_plain_loaders_are_measured_alike(
         batches = make_trainer(1).predict(model, predicted)
         probabilities.append([one for batch in batches for one in batch])
     assert scores[0] == scores[1] == scores[2]
-    assert len(probabilities[0]) == len(TESTED)
+    assert len(probabilities[0]) == 2
     for found in probabilities[1:]:
         for one, other in zip(found, probabilities[0], strict=True):
             np.testing.assert_array_equal(one, other)
@@ -199,9 +182,8 @@ def test_a_run_of_loaders_goes_on_from_its_checkpoint(make_trainer, memory, tmp_
         fit(3, tmp_path / "1.ckpt", rows=32)
 
 
-def test_a_run_of_loaders_does_not_go_on_with_other_candidates(
-    make_trainer, scans, tmp_path
-) -> None:
+def test_a_run_of_loaders_does_not_go_on_with_other_candidates(make_trainer, tmp_path) -> None:
+    scans = [Scan.of(scene(300, seed)) for seed in range(3)]
     near = [scan.with_label(np.where(scan.range < 8, SNOW, 0)) for scan in scans]
     memory = InMemory(near, near, near, card="wads", loading=LOADING)
 

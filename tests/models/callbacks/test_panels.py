@@ -146,14 +146,10 @@ def test_without_tensorboard_nothing_is_drawn(make_trainer, rainy, drawn) -> Non
     assert not drawn
 
 
-def scan_of(seed: int, labelled: bool = True) -> Scan:
-    scan = Scan.of(scene(90, seed=seed))
-    return scan.with_label(np.where(np.arange(90) >= 60, SNOW, 40)) if labelled else scan
-
-
 @pytest.fixture
 def data() -> InMemory:
-    scans = [scan_of(seed) for seed in range(3)]
+    label = np.where(np.arange(90) >= 60, SNOW, 40)
+    scans = [Scan.of(scene(90, seed=seed)).with_label(label) for seed in range(3)]
     return InMemory(train=scans[:1], validation=scans, test=scans[1:], card="wads")
 
 
@@ -176,10 +172,6 @@ def train(make_trainer, data, tmp_path) -> Callable[..., Any]:
         return trainer, model, EventAccumulator(str(tmp_path / "log"), sizes).Reload()
 
     return run
-
-
-def steps_of_images(events: EventAccumulator, name: str) -> list[int]:
-    return [event.step for event in events.Images(name)]
 
 
 def test_the_numbers_are_those_of_the_counts(train) -> None:
@@ -227,7 +219,7 @@ def test_the_curve_goes_through_the_counts_at_the_threshold(train) -> None:
 
 def test_a_training_that_ends_early_is_drawn_as_it_ends(train) -> None:
     _, _, events = train(50, ErrorPanels(2), max_steps=4)
-    assert steps_of_images(events, f"validation: {TABLE}") == [1, 4]
+    assert [event.step for event in events.Images(f"validation: {TABLE}")] == [1, 4]
 
 
 def test_no_pictures_leave_the_numbers(train) -> None:

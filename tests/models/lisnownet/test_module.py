@@ -32,6 +32,8 @@ from derain.views.probability import probability_of_rain
 from derain.views.range_image import RangeImage
 from derain.views.spherical_grid import grid_of
 
+from ..conftest import assert_same
+
 WADS = load_card("wads")
 PUBLISHED = SelectionRule(residual=0.008, ground=-1.8, intensity=2 / 255, near=2.5)
 
@@ -190,17 +192,14 @@ class Progress(lightning.Callback):
     """Keeps what every validation measured."""
 
     def __init__(self) -> None:
-        self.monitor: list[float] = []
-        self.loss: list[float] = []
-        self.iou: list[float] = []
+        self.measured: list[dict[str, float]] = []
 
     def on_validation_end(self, trainer: lightning.Trainer, *_: Any) -> None:
         if not trainer.sanity_checking:
-            metrics = trainer.callback_metrics
-            self.monitor.append(metrics[MONITOR].item())
-            self.loss.append(metrics["val/loss"].item())
-            if "val/iou" in metrics:
-                self.iou.append(metrics["val/iou"].item())
+            self.measured.append({n: v.item() for n, v in trainer.callback_metrics.items()})
+
+    def __getitem__(self, name: str) -> list[float]:
+        return [values[name] for values in self.measured]
 
 
 @dataclass(frozen=True)
@@ -210,11 +209,6 @@ class Run:
     model: LiSnowNet
     progress: Progress
     best: dict[str, Any]
-
-
-def assert_same(one: dict[str, Tensor], other: dict[str, Tensor]) -> None:
-    for name, tensor in one.items():
-        assert torch.equal(tensor, other[name]), name
 
 
 def write_four(folder: Path, validated: int = 300) -> Path:
@@ -228,11 +222,6 @@ def swap_validation_labels(folder: Path) -> None:
     write_labels(folder / "3.label", np.where(label == 110, 0, 110))
 
 
-def scenes_of(folder: Path, card: str = "wads") -> Folder:
-    parts = {"train": ["[012].bin"], "validation": ["3.bin"]}
-    return Folder(str(folder), card, **parts, loading=Loading(batch_size=3))
-
-
 @pytest.fixture(scope="module")
 def train(make_trainer, small_grid) -> Callable[..., Run]:
     """Trains on the scenes in a folder, from the same seed unless it is given another."""
@@ -243,7 +232,9 @@ def train(make_trainer, small_grid) -> Callable[..., Run]:
         progress = Progress()
         best = ModelCheckpoint(folder / "runs", "best", monitor=MONITOR, mode="max")
         trainer = make_trainer(epochs=4, callbacks=[progress, best], enable_checkpointing=True)
-        trainer.fit(model, scenes_of(folder))
+        parts = {"train": ["[012].bin"], "validation": ["3.bin"]}
+        data = Folder(str(folder), "wads", **parts, loading=Loading(batch_size=3))
+        trainer.fit(model, data)
         return Run(model, progress, torch.load(best.best_model_path, weights_only=True))
 
     return fit
@@ -272,18 +263,18 @@ def test_training_labels_are_not_opened_and_garbage_in_them_changes_nothing(
     run = train(tmp_path)
     assert opened == {tmp_path / "3.label"}
     assert_same(labelled.model.state_dict(), run.model.state_dict())
-    assert labelled.progress.iou == run.progress.iou
+    assert labelled.progress["val/iou"] == run.progress["val/iou"]
     assert labelled.model.spec == run.model.spec
 
 
 def test_validation_labels_measure_and_choose_nothing(train, labelled, tmp_path) -> None:
     swap_validation_labels(write_four(tmp_path))
     run = train(tmp_path)
-    assert labelled.progress.iou != run.progress.iou
-    assert len(set(labelled.progress.iou)) > 1
-    assert labelled.progress.monitor == run.progress.monitor
-    assert labelled.progress.monitor == [-loss for loss in labelled.progress.loss]
-    best = int(np.argmax(labelled.progress.monitor))
+    assert labelled.progress["val/iou"] != run.progress["val/iou"]
+    assert len(set(labelled.progress["val/iou"])) > 1
+    assert labelled.progress[MONITOR] == run.progress[MONITOR]
+    assert labelled.progress[MONITOR] == [-loss for loss in labelled.progress["val/loss"]]
+    best = int(np.argmax(labelled.progress[MONITOR]))
     assert labelled.best["epoch"] == run.best["epoch"] == best
     assert_same(labelled.best["state_dict"], run.best["state_dict"])
 
@@ -355,7 +346,7 @@ def test_the_scores_of_an_epoch_are_those_of_its_checkpoint(fitted) -> None:
     iou = (found & rain).sum() / (found | rain).sum()
     assert 0 < iou < 1
     run = fitted.run
-    assert run.progress.iou[run.best["epoch"]] == pytest.approx(iou)
+    assert run.progress["val/iou"][run.best["epoch"]] == pytest.approx(iou)
 
 
 def test_measuring_a_model_leaves_its_rule_as_it_is(fitted, make_trainer, tmp_path) -> None:

@@ -1,20 +1,15 @@
 """SalsaNext as it is trained: its Spec, its losses, its learning rate, published weights."""
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import lightning
 import numpy as np
 import pytest
 import torch
 from numpy.typing import NDArray
-from recorded_scenes import write_scenes
 from torch import Tensor
 
 from derain.cards.card import load_card
-from derain.datamodules.base import Loading
-from derain.datamodules.folder import Folder
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.learning.batch import Batch
@@ -157,18 +152,6 @@ def test_both_losses_are_defined_for_one_kind_of_pixel(of, published_loss) -> No
     assert logits.grad.isfinite().all()
 
 
-@pytest.fixture
-def scenes(tmp_path) -> Callable[..., Folder]:
-    """Makes a data module of four small labelled scenes."""
-    write_scenes(tmp_path, *4 * [300], name="{}.bin", rain=110)
-
-    def make(**loading: Any) -> Folder:
-        parts = {"train": ["[012].bin"], "validation": ["3.bin"], "test": ["3.bin"]}
-        return Folder(str(tmp_path), "wads", **parts, loading=Loading(**loading))
-
-    return make
-
-
 class LearningRates(lightning.Callback):
     """Keeps the learning rate of every step of the optimiser."""
 
@@ -190,7 +173,7 @@ def test_the_optimiser_and_its_learning_rate_at_every_step_are_as_published(
     accumulating = {"accumulate_grad_batches": batches_a_step, "limit_val_batches": 0}
     trainer = make_trainer(epochs=4, callbacks=[rates], **accumulating)
     model = SalsaNext(small_grid, width=2, warm_up=warm_up, decay=decay)
-    trainer.fit(model, scenes())
+    trainer.fit(model, scenes("wads"))
     (optimizer,) = trainer.optimizers
     (group,) = optimizer.param_groups
     assert isinstance(optimizer, torch.optim.SGD)
@@ -203,7 +186,7 @@ def test_the_optimiser_and_its_learning_rate_at_every_step_are_as_published(
 
 
 def test_the_model_learns_grid_spec_and_class_weights_from_its_data(make_trainer, scenes) -> None:
-    model, data = SalsaNext(width=4), scenes(batch_size=3)
+    model, data = SalsaNext(width=4), scenes("wads", batch_size=3)
     trainer = make_trainer(epochs=1, limit_val_batches=1)
     trainer.fit(model, data)
     fitted = SalsaNext(width=4).spec_for(WADS, list(data.training_scans(20)))
