@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from derain.cards.card import load_card
 from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.base import Loading, ScanDataModule
 from derain.datamodules.folder import Folder
@@ -107,16 +106,10 @@ def test_without_asking_duplicates_are_counted_as_often_as_they_are_there(
     assert [len(scan) for scan in scans(data, "test")] == [30]
 
 
-@pytest.fixture
-def unsupervised(small_grid, connect) -> Connect:
-    """Has a data module agree with a model that does not learn from labels."""
-    return lambda data: connect(data, model=LiSnowNet(small_grid, width=2))
-
-
 def test_a_model_that_learns_from_no_labels_is_only_measured_by_those_that_there_are(
-    folder, unsupervised, tmp_path
+    folder, connect, small_grid, tmp_path
 ) -> None:
-    data = unsupervised(folder(batch_size=SCANS))
+    data = connect(folder(batch_size=SCANS), model=LiSnowNet(small_grid, width=2))
     assert {frame.label_path for frame in data.frames("train")} == {None}
     assert {batch.target for batch in batches(data, "train")} == {None}
     assert {scan.label for scan in data.training_scans(SCANS, labelled=False)} == {None}
@@ -134,19 +127,6 @@ def test_a_model_that_learns_from_labels_needs_them_all(folder, connect, tmp_pat
     with pytest.raises(InputError, match=r"2\.bin: its labels are not at .*data card"):
         data.frames(part)
     assert len(data.frames("predict")) == SCANS
-
-
-@pytest.mark.parametrize("card", ["simulated", "rehearse3d"])
-def test_statistics_that_the_card_lacks_are_taken_from_the_training_scans(
-    tmp_path, write, unsupervised, card
-) -> None:
-    write(tmp_path / "0.bin", points=scene(40))
-    data = unsupervised(Folder(str(tmp_path), card, train=["0.bin"]))
-    np.testing.assert_allclose(data.card.mean, scene(40).astype(np.float64).mean(axis=0))
-    assert data.card.rain_share == load_card(card).rain_share  # which no label gives
-    complete = data.card
-    data.complete_card(labelled=False)
-    assert data.card == complete
 
 
 @pytest.mark.parametrize(

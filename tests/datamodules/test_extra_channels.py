@@ -41,6 +41,7 @@ def data(request, tmp_path) -> Folder:
 
 
 def test_extra_channels_are_measured_and_batched_for_a_model_that_names_them(data) -> None:
+    assert set(data.read(data.frames("train")[0]).fields) == set(COLUMNS)  # without a model: all
     model = OutDet(channels=("x", "y", "z", "intensity", "rcs", "radar", "doppler"))
     agree_on_task(model, data)
     scans = [fused(number) for number in range(3)]
@@ -59,10 +60,3 @@ def test_extra_channels_are_measured_and_batched_for_a_model_that_names_them(dat
             known = ~np.isnan(column)
             np.testing.assert_array_equal(points[known, place], column[known])
             np.testing.assert_array_equal(points[~known, place], np.float32(model.spec.mean[place]))
-
-
-def test_a_model_that_names_none_is_given_none(data) -> None:
-    assert set(data.read(data.frames("train")[0]).fields) == set(COLUMNS)  # without a model: all
-    agree_on_task(OutDet(), data)
-    assert data.card.extra == {}
-    assert data.read(data.frames("train")[0]).fields == {}

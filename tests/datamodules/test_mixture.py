@@ -105,15 +105,11 @@ def test_each_part_is_read_in_its_own_unit() -> None:
     assert data.card.statistics("intensity")[0] == pytest.approx(50.5 * mean, rel=1e-5)
 
 
-def trainer(**options: object) -> lightning.Trainer:
-    quiet = {"logger": False, "enable_progress_bar": False, "enable_model_summary": False}
-    return lightning.Trainer(accelerator="cpu", num_sanity_val_steps=0, **quiet, **options)
-
-
 def test_validation_is_of_all_parts_together_and_reported_for_each(tmp_path) -> None:
     lightning.seed_everything(3)
     model, data = OutDet(neighbours=3), mixture()
-    run = trainer(max_epochs=1, enable_checkpointing=False)
+    options = {"logger": False, "enable_checkpointing": False, "num_sanity_val_steps": 0}
+    run = lightning.Trainer(max_epochs=1, accelerator="cpu", **options)
     run.fit(model, data)
     logged = {name: float(value) for name, value in run.callback_metrics.items()}
     predicted = [rain > 0.5 for batch in run.predict(model, data) for rain in batch]

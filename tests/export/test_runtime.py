@@ -72,16 +72,13 @@ def test_files_of_an_early_derain_answer_as_they_did() -> None:
 @pytest.mark.parametrize(
     "convert",
     [
-        lambda points: np.column_stack([points, np.arange(len(points), dtype=np.float32)]),
-        lambda points: points.astype(np.float64),
         np.asfortranarray,
         lambda points: np.repeat(points, 2, axis=0)[::2],
         lambda points: points.astype(">f4"),
-        lambda points: Scan(points[:, :3].copy(), points[:, 3].copy()),
     ],
-    ids=["5 columns", "float64", "Fortran order", "strided", "big-endian", "Scan"],
+    ids=["Fortran order", "strided", "big-endian"],
 )
-def test_points_come_in_any_form(derainer, convert) -> None:
+def test_points_lie_in_memory_in_any_way(derainer, convert) -> None:
     points = scene(500)
     np.testing.assert_array_equal(
         derainer.probability(convert(points)), derainer.probability(points)

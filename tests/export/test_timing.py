@@ -70,12 +70,9 @@ def test_a_model_is_timed_on_a_file_or_on_a_made_up_scan(onnx_model, tmp_path, m
 
 def test_the_report_is_a_table_of_percentiles() -> None:
     times = RunTimes({"read": np.full(101, 2.0), "network": np.arange(101.0)})
-    report = Latency(times, 115_881, 2, "a processor; versions")
-    assert str(report).splitlines() == [
-        "115,881 points, 2 threads, 101 runs, milliseconds",
-        "stage         p50      p90      p99",
-        "read          2.0      2.0      2.0",
-        "network      50.0     90.0     99.0",
-        "total        52.0     92.0    101.0",
-        "a processor; versions",
-    ]
+    first, *table, last = str(Latency(times, 115_881, 2, "a processor")).splitlines()
+    assert first == "115,881 points, 2 threads, 101 runs, milliseconds"
+    assert table[0].split() == ["stage", "p50", "p90", "p99"]
+    assert table[2].split() == ["network", "50.0", "90.0", "99.0"]
+    assert table[3].split() == ["total", "52.0", "92.0", "101.0"]
+    assert last == "a processor"

@@ -130,11 +130,6 @@ def test_published_weights_are_taken_over(outdet, sample, prefix, neighbours) ->
     assert (model.spec.data, model.spec.mean) == ("WADS", load_card("wads").mean)
 
 
-def test_weights_need_a_card_with_statistics(outdet) -> None:
-    with pytest.raises(InputError, match="REHEARSE-3D: the data card has no statistics of x"):
-        OutDet.from_published(published(outdet().network), load_card("rehearse3d"))
-
-
 @pytest.mark.parametrize(
     "change",
     [

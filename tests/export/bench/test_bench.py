@@ -113,7 +113,9 @@ def dim(scan):
 
 found = bench([dim, "all"], [scan], "wads", repeats=1)
 for row in found.rows:
-    print(row.title, row.scores.pooled.iou == 1, row.cost.alone, row.cost.failure)
+    cost = row.cost
+    print(row.title, row.scores.pooled.iou == 1, cost.alone, cost.peak_memory is None)
+    assert cost.times.percentile(50) > 0, cost.failure
 """
 
 
@@ -123,7 +125,9 @@ def test_a_script_that_guards_nothing_is_run_once_and_times_its_own_functions(tm
         [sys.executable, str(tmp_path / "script.py")], capture_output=True, text=True
     )
     assert finished.returncode == 0, finished.stderr
-    assert finished.stdout.splitlines() == ["begins", "dim True False None", "all False True None"]
+    linux = sys.platform == "linux"  # elsewhere no peak of memory is known
+    lines = ["begins", "dim True False True", f"all False True {not linux}"]
+    assert finished.stdout.splitlines() == lines
 
 
 @pytest.mark.parametrize(
@@ -143,7 +147,6 @@ def test_a_function_that_gives_no_mask_fails_in_every_scan(labelled, answer) -> 
         ([], "methods: there are none"),
         ([DSOR], "methods: .*DSOR.* is no method"),
         ([3], "methods: 3 is no method"),
-        (["nothing"], "nothing: no such method or file"),
         (["position"], "position: it has no scans to learn from. Give --train"),
         (["x=dror", "x=none"], "x: it is the title of two methods"),
     ],

@@ -27,11 +27,3 @@ def test_a_method_that_cannot_be_timed_states_why(labelled) -> None:
     assert cost.failure.startswith("moved.onnx: no such method or file")
     assert np.isnan(cost.times.percentile(50))
     assert cost.peak_memory is None
-
-
-def test_what_only_this_program_knows_is_timed_in_its_process(labelled) -> None:
-    entries = bench_entries({"mine": lambda scan: scan.intensity < 4, "all": "all", "dror": "dror"})
-    assert [entry.is_picklable for entry in entries] == [False, True, True]
-    cost = measure_cost(entries[0], Timing(labelled.frames[:1], repeats=1))
-    assert (cost.alone, cost.peak_memory, cost.failure) == (False, None, None)
-    assert cost.times.percentile(50) > 0

@@ -158,11 +158,8 @@ def test_a_residual_is_fitted_to_changes_that_are_all_the_same(value) -> None:
 
 
 def test_an_unknown_constant_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(InputError, match=r"rule: \['far', 'height'\] are no constants") as error:
+    with pytest.raises(InputError, match=r"rule: \['far', 'height'\] .*Available: \['residual'"):
         SelectionRule.fitted({"height": 1.0, "near": 2.5, "far": 9.0}, [])
-    assert "Available: ['residual', 'ground', 'intensity', 'near', 'full_scale']" in str(
-        error.value
-    )
 
 
 @pytest.mark.parametrize("scan", HARD_CASES.values(), ids=HARD_CASES)
