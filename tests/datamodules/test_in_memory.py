@@ -50,7 +50,3 @@ def test_what_cannot_be_used_is_refused() -> None:
         data.frames("test")
     with pytest.raises(InputError, match=r"validation: there are no scans for it\. Give scans"):
         data.frames("validation")
-    with pytest.raises(InputError, match="winter: no such data card"):
-        InMemory(card="winter")
-    with pytest.raises(InputError, match=r"scan\.bin: .*derain\.read_scan"):
-        InMemory(["scan.bin"], card=WADS)

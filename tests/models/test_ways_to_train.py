@@ -134,9 +134,11 @@ def without_rain(memory: InMemory, *parts: str) -> InMemory:
     return InMemory(*scans.values(), card="wads", loading=LOADING)
 
 
-def test_training_on_scans_without_rain_is_refused(make_trainer, memory) -> None:
-    with pytest.raises(InputError, match=r"no point of these scans is falling-snow .*WADS"):
-        make_trainer(epochs=1).fit(OutDet(), without_rain(memory, "train"))
+@pytest.mark.parametrize(("card", "rain"), [("wads", "falling-snow"), ("semantickitti", "rain")])
+def test_training_on_scans_without_rain_is_refused(make_trainer, memory, card, rain) -> None:
+    sources = without_rain(memory, "train").sources
+    with pytest.raises(InputError, match=f"(?i)no point of these scans is {rain} .*{card}"):
+        make_trainer(1).fit(OutDet(), InMemory(sources["train"], sources["train"], card=card))
 
 
 def test_measuring_on_scans_without_rain_is_warned_of_once(make_trainer, memory, capsys) -> None:

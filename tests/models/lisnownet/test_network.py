@@ -39,7 +39,7 @@ def small(channels: int = 2, width: int = 4, seed: int = 0) -> LiSnowNetwork:
 
 
 def scene(height: int, width: int, share: float = 0.7, scans: int = 1) -> tuple[Tensor, Tensor]:
-    """Random images and which of their pixels are valid."""
+    """Random images of two channels and which of their pixels are valid."""
     generator = torch.Generator().manual_seed(height * 1000 + width)
     image = 4 * torch.rand(scans, 2, height, width, generator=generator)
     return image, torch.rand(scans, 1, height, width, generator=generator) < share
@@ -214,13 +214,6 @@ def test_each_block_is_multiplied_by_the_basis() -> None:
         np.testing.assert_allclose(bands[..., row, column], expected)
 
 
-def holed(height: int, width: int, share: float, seed: int = 0) -> tuple[Tensor, Tensor]:
-    """A random image of two channels and which of its pixels are valid."""
-    generator = torch.Generator().manual_seed(seed)
-    image = 4 * torch.rand(1, 2, height, width, generator=generator, dtype=torch.float64)
-    return image, torch.rand(1, 1, height, width, generator=generator) < share
-
-
 def neighbourhoods(image: NDArray[np.float64], size: int) -> NDArray[np.float64]:
     """(2, H, W, size, size), edges continued by NumPy."""
     margin = size // 2
@@ -253,7 +246,8 @@ def test_the_filled_image_is_the_published_one(shared) -> None:
 @pytest.mark.parametrize(("height", "width"), [(3, 2), (4, 7), (16, 64)])
 @pytest.mark.parametrize("share", [0.9, 0.4, 0.15])
 def test_holes_are_filled_by_the_published_formula(height, width, share) -> None:
-    image, valid = holed(height, width, share)
+    image, valid = scene(height, width, share)
+    image = image.double()
     valid[..., ::2, 0] = True  # a value in every row after the first step
     expected = as_published(torch.where(valid, image, -1)[0].numpy())
     np.testing.assert_allclose(fill_holes(image, valid)[0], expected, atol=1e-12)
@@ -261,13 +255,14 @@ def test_holes_are_filled_by_the_published_formula(height, width, share) -> None
 
 @pytest.mark.parametrize("rubbish", [-1.0, 0.0, 1e30, np.nan, np.inf, -np.inf])
 def test_what_empty_pixels_hold_does_not_matter(rubbish) -> None:
-    image, valid = holed(16, 32, 0.3)
+    image, valid = scene(16, 32, 0.3)
     filled = fill_holes(torch.where(valid, image, rubbish), valid)
     assert torch.equal(filled, fill_holes(image, valid))
 
 
 def test_a_row_far_from_any_value_takes_the_level_of_the_whole_image() -> None:
-    image, valid = holed(12, 16, 1.0)
+    image, valid = scene(12, 16, 1.0)
+    image = image.double()
     valid[..., 2:11, :] = False
     rows = [0, 1, 2, 10, 11]  # those with values once holes beside valid pixels are filled
     grown = image[0].numpy().copy()
@@ -282,12 +277,12 @@ def test_a_row_far_from_any_value_takes_the_level_of_the_whole_image() -> None:
 
 @pytest.mark.parametrize("size", [(1, 1), (2, 3), (16, 32)])
 def test_an_image_without_a_return_is_zero(size) -> None:
-    image, valid = holed(*size, share=0)
+    image, valid = scene(*size, share=0)
     assert torch.equal(fill_holes(image, valid), torch.zeros_like(image))
 
 
 def test_a_single_return_fills_the_whole_image() -> None:
-    image, valid = holed(16, 32, 0.0)
+    image, valid = scene(16, 32, 0.0)
     valid[..., 5, 0] = True
     expected = image[..., 5:6, 0:1].expand_as(image)
     torch.testing.assert_close(fill_holes(image, valid), expected)
@@ -296,8 +291,8 @@ def test_a_single_return_fills_the_whole_image() -> None:
 @pytest.mark.parametrize("share", [0.0, 0.01, 0.3, 1.0])
 @pytest.mark.parametrize("value", [None, 0.0, 2.7])
 def test_gradients_are_finite(share, value) -> None:
-    image, valid = holed(16, 32, share)
-    image = image.float() if value is None else torch.full((1, 2, 16, 32), value)
+    image, valid = scene(16, 32, share)
+    image = image if value is None else torch.full_like(image, value)
     valid[..., 3:10, :] = False
     image.requires_grad_()
     fill_holes(image, valid).square().sum().backward()
@@ -306,8 +301,8 @@ def test_gradients_are_finite(share, value) -> None:
 
 @pytest.mark.parametrize("largest", [1e-38, 1e4, 3e38])
 def test_ranges_of_every_size_stay_finite(largest) -> None:
-    image, valid = holed(16, 32, 0.3)
-    image = (image.float() / 4 * largest) ** (1 / 3)
+    image, valid = scene(16, 32, 0.3)
+    image = (image / 4 * largest) ** (1 / 3)
     image.requires_grad_()
     filled = fill_holes(image, valid)
     filled.sum().backward()
@@ -316,8 +311,7 @@ def test_ranges_of_every_size_stay_finite(largest) -> None:
 
 
 def test_autocast_takes_nothing_from_the_precision_of_what_is_filled() -> None:
-    image, valid = holed(16, 32, 0.3)
-    image = image.float()
+    image, valid = scene(16, 32, 0.3)
     with torch.autocast("cpu", dtype=torch.bfloat16):
         filled = fill_holes(image, valid)
     assert torch.equal(filled, fill_holes(image, valid))
