@@ -9,7 +9,7 @@ import pytest
 
 from derain.cards.card import DataCard, load_card
 from derain.datamodules.augmentation import Augmentation
-from derain.datamodules.base import Loading, ScanDataModule
+from derain.datamodules.base import Loading
 from derain.datamodules.folder import Folder
 from derain.datamodules.in_memory import InMemory
 from derain.datamodules.mixture import Mixture
@@ -170,16 +170,12 @@ def test_sequences_are_recorded_under_the_name_of_their_data() -> None:
 
 def test_a_part_needs_the_channels_that_the_model_sees() -> None:
     fields = [replace(scan, fields={"doppler": scan.xyz[:, 0]}) for scan in scans(3, [0, 1])]
-    parts: dict[str, ScanDataModule] = {
-        "radar": InMemory(fields, fields, card=SNOW),
-        "plain": part(SNOW),
-    }
+    data = Mixture({"radar": InMemory(fields, fields, card=SNOW), "plain": part(SNOW)})
     model = OutDet(neighbours=3, channels=("range", "doppler"))
     with pytest.raises(InputError, match=r"part 'plain': .* has no doppler"):
-        agree_on_task(model, Mixture(parts))
+        agree_on_task(model, data)
     dark = [replace(scan, intensity=None) for scan in scans(3, [0, 1])]
-    parts = {"dark": InMemory(dark, dark, card=SNOW), "plain": part(SNOW)}
-    data = Mixture(parts)
+    data = Mixture({"dark": InMemory(dark, dark, card=SNOW), "plain": part(SNOW)})
     agree_on_task(OutDet(neighbours=3), data)
     with pytest.raises(InputError, match=r"part 'dark': .* has no intensity"):
         data.train_dataloader()

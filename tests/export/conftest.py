@@ -1,9 +1,11 @@
 """A runtime that a test brings itself."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import onnx
 import pytest
 from numpy.typing import NDArray
 
@@ -35,6 +37,15 @@ class RainySession(Session):
 
     def run(self, inputs: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
         return self.usual.run(inputs) + np.float32([0, RAINY[self.settings[1]]])
+
+
+def shapes_of(model: Path) -> dict[str, list[str | int]]:
+    """Shapes of a graph's inputs and outputs, whose sizes are numbers or names."""
+    graph = onnx.load(model, load_external_data=False).graph
+    return {
+        value.name: [size.dim_param or size.dim_value for size in value.type.tensor_type.shape.dim]
+        for value in (*graph.input, *graph.output)
+    }
 
 
 @pytest.fixture

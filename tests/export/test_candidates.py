@@ -6,7 +6,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import onnx
 import pytest
 
 from derain.cards.card import load_card
@@ -18,6 +17,8 @@ from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.scan import Scan
 from derain.views.candidates import Bound, Candidates
+
+from .conftest import shapes_of
 
 NEAR_AND_DIM = Candidates((Bound("range", most=25.0), Bound("intensity", most=40.0)))
 WADS = load_card("wads")
@@ -47,11 +48,7 @@ def test_its_answer_for_candidates_is_bit_for_bit_that_of_the_model_without(
         np.testing.assert_array_equal(of_candidates.probability(scan), expected, err_msg=name)
         judged += int(among.sum())
     assert judged > 1000
-    graph = onnx.load(judging_candidates).graph
-    lengths = {
-        value.name: value.type.tensor_type.shape.dim[0].dim_param
-        for value in (*graph.input, *graph.output)
-    }
+    lengths = {name: shape[0] for name, shape in shapes_of(judging_candidates).items()}
     of_their_own = {"points": "points", "candidates": "candidates", "logits": "candidates"}
     shared = dict.fromkeys(("distances", "neighbours"), "neighbourhoods")
     assert lengths == {**of_their_own, **shared}

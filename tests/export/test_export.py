@@ -21,6 +21,8 @@ from derain.export.runtime import Derainer
 from derain.models.outdet import OutDet
 from derain.scan import Scan
 
+from .conftest import shapes_of
+
 SCENE = [("scene", Scan.of(scene()))]
 
 
@@ -35,11 +37,7 @@ def test_the_file_holds_a_whole_network_and_how_it_is_used(onnx_model, random_ou
     assert folded <= stored <= folded + 100
     operators = {node.op_type for node in proto.graph.node}
     assert not operators & {"BatchNormalization", "Dropout"}
-    shapes = {
-        value.name: [size.dim_param or size.dim_value for size in value.type.tensor_type.shape.dim]
-        for value in (*proto.graph.input, *proto.graph.output)
-    }
-    assert shapes == {
+    assert shapes_of(onnx_model) == {
         "points": ["points", 4],
         "distances": ["points", 9],
         "neighbours": ["points", 9],

@@ -28,6 +28,8 @@ from derain.sources.frame import Frame, MemoryFrame
 from derain.sources.source import Frames
 from derain.views.view import View
 
+from .conftest import shapes_of
+
 PIXELS = 18 * 60
 CALIBRATION = Frames.of_scans([Scan.of(scene(3000, n), f"scene {n}") for n in range(3)])
 
@@ -59,11 +61,7 @@ def test_the_graph_is_of_one_size_and_holds_nothing_of_the_machine(image_model, 
     assert {a.s for a in attributes} <= {b"constant"}  # the checker lets opset 19's "wrap" pass
     assert not any(len(node.metadata_props) for node in proto.graph.node)
     assert str(Path(models.__file__).parent).encode() not in image_onnx.read_bytes()
-    shapes = {
-        value.name: [size.dim_param or size.dim_value for size in value.type.tensor_type.shape.dim]
-        for value in (*proto.graph.input, *proto.graph.output)
-    }
-    assert shapes == {
+    assert shapes_of(image_onnx) == {
         "image": [1, len(image_model.channels), 18, 60],
         "valid": [1, 1, 18, 60],
         "logits": [PIXELS, 2],

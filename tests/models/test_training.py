@@ -1,6 +1,5 @@
 """Training learns, goes on where it stopped, and does the same again from the same seed."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,6 @@ from derain.errors import InputError
 from derain.files.labels import write_labels
 from derain.learning.batch import Batch
 from derain.learning.losses import class_weights
-from derain.models.base import DerainingModule
 from derain.models.checkpoint import load_model
 from derain.models.lisnownet import LiSnowNet
 from derain.models.measured import MONITOR
@@ -25,6 +23,7 @@ from derain.models.salsanext import SalsaNext
 from derain.sources.training_record import record_of_scans
 
 from .conftest import assert_same
+from .two_processes import GRID
 
 RAIN = 3
 
@@ -53,28 +52,24 @@ def test_without_rain_to_validate_on_the_best_epoch_is_that_of_the_least_loss(
     assert len(warnings) == 1
 
 
-def networks() -> dict[str, Callable[[], DerainingModule]]:
-    """Small ones of every kind; each draws dropout."""
-    grid = {"rows": 16, "columns": 64, "inclination": [-30.0, 20.0]}
-    return {
-        "outdet": lambda: OutDet(milestones=(1, 3)),
-        "salsanext": lambda: SalsaNext(grid=grid, width=2, warm_up=1.5),
-        "lisnownet": lambda: LiSnowNet(grid=grid, width=2),
-    }
-
-
+# Small networks of every kind; each draws dropout.
 @pytest.mark.parametrize(
-    ("network", "workers"), [("outdet", 2), ("salsanext", 0), ("lisnownet", 0)]
+    ("network", "options", "workers"),
+    [
+        (OutDet, {"milestones": (1, 3)}, 2),
+        (SalsaNext, {"grid": GRID, "width": 2, "warm_up": 1.5}, 0),
+        (LiSnowNet, {"grid": GRID, "width": 2}, 0),
+    ],
 )
 def test_a_run_goes_on_from_its_last_checkpoint_as_if_it_had_not_stopped(
-    make_trainer, scenes, tmp_path, network, workers
+    make_trainer, scenes, tmp_path, network, options, workers
 ) -> None:
     # All that training draws: order, every augmentation, dropout.
     changed = Augmentation(mirror_probability=0.5, dropping_probability=0.5)
 
     def fit(epochs: int, checkpoint: Path | None = None) -> lightning.Trainer:
         lightning.seed_everything(0)
-        model = networks()[network]()
+        model = network(**options)
         torch.rand(epochs)  # what else draws is not to matter
         last = ModelCheckpoint(tmp_path, filename=f"last{epochs}", enable_version_counter=False)
         trainer = make_trainer(epochs=epochs, callbacks=[last], enable_checkpointing=True)

@@ -47,16 +47,16 @@ def test_what_is_written_is_not_kept(make_trainer, data, outdet, tmp_path, capsy
         np.testing.assert_array_equal(np.fromfile(label, "<u4"), expected)
 
 
-@pytest.mark.parametrize("place", ["beside", "in the folder of labels"])
+@pytest.mark.parametrize(
+    ("label", "out", "pattern"),
+    [("a/2.label", ".", "*/*.bin"), ("labels/2.label", "a/../labels", "a/*.bin")],
+    ids=["beside", "in the folder of labels"],
+)
 def test_labels_are_not_overwritten_by_what_is_found(
-    make_trainer, data, outdet, tmp_path, place
+    make_trainer, data, outdet, tmp_path, label, out, pattern
 ) -> None:
-    label, out = {
-        "beside": (tmp_path / "a/2.label", tmp_path),
-        "in the folder of labels": (tmp_path / "labels/2.label", tmp_path / "a/../labels"),
-    }[place]
-    if place == "in the folder of labels":
-        data.patterns["predict"] = ["a/*.bin"]
+    label, out = tmp_path / label, tmp_path / out
+    data.patterns["predict"] = [pattern]
     label.parent.mkdir(exist_ok=True)
     label.write_bytes(b"truth")
     files = sorted(tmp_path.rglob("*"))

@@ -4,7 +4,6 @@ import lightning
 import numpy as np
 import pytest
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from derain.cards.card import load_card
@@ -93,16 +92,11 @@ def losing(published_loss: bool, weight: tuple[float, float] = (1.5, 6.0)) -> Sa
     return model
 
 
-def as_numbers(logits: Tensor) -> NDArray[np.float64]:
-    """Probabilities of the two classes."""
-    rain = probability_of_rain(logits.numpy()).astype(np.float64)
-    return np.stack([1 - rain, rain], axis=1)
-
-
 def test_the_published_loss_trains_empty_pixels_and_knows_no_false_alarm(pixels) -> None:
     logits, target = pixels
     loss = losing(published_loss=True).segmentation_loss(logits, target)
-    probability, rain = as_numbers(logits), target.numpy() == 1
+    found, rain = probability_of_rain(logits.numpy()).astype(np.float64), target.numpy() == 1
+    probability = np.stack([1 - found, found], axis=1)
     assert loss.lovasz.item() == pytest.approx((1 - probability[rain, 1]).mean(), rel=1e-5)
     weight = np.where(rain, 6.0, 1.5)
     surprise = -np.log(probability[np.arange(500), rain.astype(int)])
