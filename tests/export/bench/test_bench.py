@@ -114,9 +114,8 @@ def dim(scan):
 methods = {"dim": dim, "same": lambda scan: dim(scan), "all": "all"}
 found = bench(methods, [scan], "wads", repeats=1)
 for row in found.rows:
-    cost = row.cost
-    print(row.title, row.scores.pooled.iou == 1, cost.alone, cost.peak_memory is None)
-    assert cost.times.percentile(50) > 0, cost.failure
+    print(row.title, row.scores.pooled.iou == 1, row.cost.alone, row.cost.peak_memory is None)
+    assert row.cost.times.percentile(50) > 0, row.cost.failure
 """
 
 
