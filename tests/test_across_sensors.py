@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from recorded_scenes import write_scenes
 
 from benchmarks.across_sensors import main
 from benchmarks.sensor_table.columns import Cell, Column, table
@@ -40,28 +41,17 @@ timed: ours
 """
 
 
-def write_scan(path: Path, label: np.ndarray | None, seed: int) -> Scan:
-    path.parent.mkdir(exist_ok=True)
-    points = scene(300, seed=seed)
-    points.tofile(path)
-    if label is not None:
-        write_labels(path.with_suffix(".label"), label)
-    return Scan.of(points)
-
-
 @pytest.fixture
 def shared(tmp_path) -> Path:
     """Scans of 300 points: with thirty drops, with ten pedestrians' points, without labels."""
     card = tmp_path / "card.yaml"
     card.write_text(CARD)
     (tmp_path / "plan.yaml").write_text(PLAN.replace("CARD", str(card)))
-    wet, dry = np.zeros((2, 300), int)
-    wet[270:], dry[:10] = 3, 4
-    for number in range(2):
-        write_scan(tmp_path / f"wet/{number}.bin", wet, number)
-    write_scan(tmp_path / "places/0.bin", wet, 0)
-    write_scan(tmp_path / "dry/0.bin", dry, 0)
-    write_scan(tmp_path / "clean/roof.bin", None, 0)
+    write_scenes(tmp_path / "wet", 300, 300, name="{}.bin", rain=3)
+    write_scenes(tmp_path / "places", 300, name="{}.bin", rain=3)
+    write_scenes(tmp_path / "dry", 300, name="{}.bin")
+    write_labels(tmp_path / "dry/0.label", np.repeat([4, 0], [10, 290]))
+    write_scenes(tmp_path / "clean", 300, name="roof.bin")
     return tmp_path
 
 
@@ -133,13 +123,7 @@ def test_what_a_method_scores_where_it_was_trained_is_marked(written) -> None:
 
 def test_cells_are_short_and_distinguish_a_point_from_none() -> None:
     share, iou = Column("roof", "%", {}), Column("snow", "IoU", {})
-    for value, text in [
-        (0, "0"),
-        (1e-5, ".001"),
-        (0.00054, ".054"),
-        (0.0131, "1.31"),
-        (1, "100.0"),
-    ]:
+    for value, text in {0: "0", 1e-5: ".001", 5.4e-4: ".054", 0.0131: "1.31", 1: "100.0"}.items():
         assert Column("roof", "%", {"a": Cell(value)}).text("a") == text
     assert Column("snow", "IoU", {"a": Cell(0.8434, learnt=True)}).text("a") == ".843 †"
     assert Column("snow", "IoU", {"a": Cell(1)}).text("a") == "1.000"

@@ -6,25 +6,17 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from types import ModuleType
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from conftest import REPOSITORY
+
+from benchmarks import kills
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="it looks for processes in /proc")
 
 
-@pytest.fixture
-def kills(monkeypatch) -> ModuleType:
-    monkeypatch.syspath_prepend(REPOSITORY)
-    import benchmarks.kills
-
-    return benchmarks.kills
-
-
-def test_a_killed_command_leaves_whole_files_and_can_be_run_again(kills, tmp_path) -> None:
+def test_a_killed_command_leaves_whole_files_and_can_be_run_again(tmp_path) -> None:
     inputs = kills.SmallInputs(tmp_path / "inputs")
     victim = kills.undisturbed(kills.COMMANDS["fuse"](inputs), tmp_path / "undisturbed")
     generator = random.Random(0)
@@ -35,7 +27,7 @@ def test_a_killed_command_leaves_whole_files_and_can_be_run_again(kills, tmp_pat
 
 
 @pytest.fixture
-def victim(kills, tmp_path) -> object:
+def victim(tmp_path) -> kills.Victim:
     """A command that has written a file of each kind, undisturbed."""
     out = tmp_path / "undisturbed" / "out"
     out.mkdir(parents=True)
@@ -56,7 +48,7 @@ def victim(kills, tmp_path) -> object:
         *(("table.md", 4), ("picture.png", 1000)),
     ],
 )
-def test_a_file_that_is_cut_short_is_found(kills, victim, tmp_path, name, left) -> None:
+def test_a_file_that_is_cut_short_is_found(victim, tmp_path, name, left) -> None:
     shutil.copytree(tmp_path / "undisturbed", tmp_path / "kill")
     assert kills.half_written(victim, tmp_path / "kill", complete=True) == []
     file = tmp_path / "kill/out" / name
@@ -68,7 +60,7 @@ def test_a_file_that_is_cut_short_is_found(kills, victim, tmp_path, name, left) 
     assert kills.half_written(victim, tmp_path / "kill", complete=True) == [f"{name} is missing"]
 
 
-def test_what_is_left_lying_about_or_running_is_found(kills, victim, tmp_path) -> None:
+def test_what_is_left_lying_about_or_running_is_found(victim, tmp_path) -> None:
     shutil.copytree(tmp_path / "undisturbed", tmp_path / "kill")
     assert kills.temporary_files(victim, tmp_path / "kill") == []
     (tmp_path / "kill/out/.derain-0.bin").touch()

@@ -12,10 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from derain.errors import InputError
-from derain.evaluation.hard_cases import hard_cases
 from derain.scan import FEWEST_ALIKE, Scan
-
-HARD_CASES = dict(hard_cases())
 
 # What separates a valid point from one that is not, and its neighbours among the float32.
 SPECIAL = [0.0, -0.0, -1.0, 1e-30, 1e6, 1000000.0625, 1e7, 10000001.0, 3e38, math.nan, math.inf]
@@ -109,13 +106,6 @@ def test_range_is_the_distance_from_the_sensor(points) -> None:
     expected = np.array([math.sqrt(x * x + y * y + z * z) for x, y, z, _ in points.tolist()])
     with np.errstate(over="ignore"):
         np.testing.assert_allclose(distance, expected.astype(np.float32), rtol=1e-6)
-
-
-@pytest.mark.parametrize("scan", HARD_CASES.values(), ids=HARD_CASES)
-def test_a_hard_scan_has_a_finite_range_and_intensity_wherever_it_is_valid(scan) -> None:
-    assert scan.valid.shape == scan.range.shape == (len(scan),)
-    assert np.isfinite(scan.range[scan.valid]).all()
-    assert scan.intensity is None or np.isfinite(scan.intensity[scan.valid]).all()
 
 
 def test_an_array_becomes_a_scan_of_its_first_four_columns() -> None:
