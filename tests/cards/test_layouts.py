@@ -26,20 +26,16 @@ def test_a_folder_of_a_layout_is_one_name(tmp_path, name) -> None:
         load_card(tmp_path / "ours.yaml")
 
 
-def test_layouts_that_identify_a_card_go_first_and_folders_of_the_lidar_before_merged_ones() -> (
-    None
-):
+def test_layouts_that_identify_a_card_go_first_and_lidar_folders_before_merged_ones() -> None:
     assert known_layouts()[0] == REHEARSE3D
     assert set(known_layouts()) == {load_card(name).layout for name in packaged_cards()}
     assert lidar_folders() == ("innoviz", "lidar_radar_pcd", "velodyne")
 
 
 def test_folders_identify_no_more_than_their_card_allows() -> None:
-    by_folders = card_by_folders(REHEARSE3D, "rain")
-    assert by_folders.name == "REHEARSE-3D"
+    assert card_by_folders(REHEARSE3D, "rain").name == "REHEARSE-3D"
     assert card_by_folders(Layout(), "rain") is None
-    of_velodyne = card_by_folders(Layout(), "classes")
-    assert of_velodyne.name == "WADS"
+    assert card_by_folders(Layout(), "classes").name == "WADS"
 
 
 @pytest.mark.parametrize(

@@ -11,12 +11,7 @@ import yaml
 
 import derain
 from derain import default
-from derain.default import (
-    DEFAULT,
-    default_checkpoint,
-    default_model,
-    model_card,
-)
+from derain.default import DEFAULT, default_checkpoint, default_model, model_card
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.export.methods import load_method
@@ -59,15 +54,18 @@ def test_without_a_name_it_is_the_model_and_judges_as_its_file_does() -> None:
     assert by_path.as_dict()["method"] == str(default_model())
 
 
-@pytest.mark.parametrize("change", [b"", b"more", None])
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda _: b"",
+        lambda model: model + b"more",
+        lambda model: model[:1000] + model[1001:] + b"1",
+    ],
+    ids=["emptied", "longer", "as long"],
+)
 def test_a_changed_file_is_refused(installed, change) -> None:
     model = installed / "model.onnx"
-    if change is None:
-        content = bytearray(model.read_bytes())
-        content[1000] ^= 1
-        model.write_bytes(content)
-    else:
-        model.write_bytes(model.read_bytes() + change if change else b"")
+    model.write_bytes(change(model.read_bytes()))
     with pytest.raises(InputError) as refused:
         derain.Derainer()
     text = str(refused.value)

@@ -8,7 +8,6 @@ from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -16,9 +15,6 @@ from derain.views.candidates import Bound, Candidates
 
 from .cpp import Program, build, missing_tools, program
 from .made_up_ros import EXAMPLE, DiagnosticArray, DiagnosticStatus, KeyValue, PointCloud2
-
-if TYPE_CHECKING:
-    pass
 
 
 @pytest.fixture(scope="session")

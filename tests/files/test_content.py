@@ -19,11 +19,7 @@ from benchmarks.fuzzing.formats import INPUTS
 from derain import InputError, Scan
 from derain.evaluation.hard_cases import scene
 from derain.files import read_scan, write_scan
-from derain.files.content import (
-    LARGEST_SCAN,
-    SMALLEST_BUDGET,
-    read_content,
-)
+from derain.files.content import LARGEST_SCAN, SMALLEST_BUDGET, read_content
 from derain.files.format import FORMATS
 from derain.files.labels import read_labels
 from derain.files.reading import reading

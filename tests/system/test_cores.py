@@ -1,33 +1,12 @@
 """Cores that a process may use: those it may run on, within its share of their time."""
 
 import os
-from collections.abc import Callable, Mapping
 
 import pytest
 
 from derain.errors import InputError
 from derain.system import cores
 from derain.system.cores import WAIT_POLICY, sleeping_threads, threads_of, usable_cores
-
-CoresIn = Callable[[str, Mapping[str, str]], int]
-
-
-@pytest.fixture
-def cores_in(tmp_path, monkeypatch) -> CoresIn:
-    """Says what a process finds that may run on eight cores."""
-    monkeypatch.setattr(cores, "_allowed_cores", lambda: 8)
-    monkeypatch.setattr(cores, "MEMBERSHIP", tmp_path / "cgroup")
-    monkeypatch.setattr(cores, "GROUPS", tmp_path / "groups")
-
-    def found(membership: str, files: Mapping[str, str]) -> int:
-        (tmp_path / "cgroup").write_bytes(membership.encode("latin-1"))
-        for name, content in files.items():
-            path = tmp_path / "groups" / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(content)
-        return usable_cores()
-
-    return found
 
 
 def version_1(group: str, quota: int, period: int = 100_000) -> dict[str, str]:
@@ -61,8 +40,18 @@ def version_1(group: str, quota: int, period: int = 100_000) -> dict[str, str]:
         ("0::/\n", {"cpu.max": "9" * 5000 + " 1\n"}, 8),
     ],
 )
-def test_a_share_of_time_limits_the_cores(cores_in, membership, files, expected) -> None:
-    assert cores_in(membership, files) == expected
+def test_a_share_of_time_limits_the_cores(
+    tmp_path, monkeypatch, membership, files, expected
+) -> None:
+    monkeypatch.setattr(cores, "_allowed_cores", lambda: 8)
+    monkeypatch.setattr(cores, "MEMBERSHIP", tmp_path / "cgroup")
+    monkeypatch.setattr(cores, "GROUPS", tmp_path / "groups")
+    (tmp_path / "cgroup").write_bytes(membership.encode("latin-1"))
+    for name, content in files.items():
+        path = tmp_path / "groups" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(content)
+    assert usable_cores() == expected
 
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="the system has no affinity")
