@@ -79,13 +79,6 @@ def test_rows_that_cannot_be_judged_stay_as_they_are() -> None:
     assert fused.valid[5:].tolist() == [False, False, False, True]
 
 
-def test_a_fused_file_has_the_columns_of_rehearse_3d(tmp_path) -> None:
-    fused = fuse(Scan.of(scene(50)), radar_frame(), PLACE)
-    write_scan(tmp_path / "fused.bin", fused)
-    table = np.fromfile(tmp_path / "fused.bin", "<f4").reshape(-1, 4)
-    np.testing.assert_array_equal(table, np.c_[fused.xyz, fused.intensity])
-
-
 def test_a_file_with_channels_names_them_and_marks_the_sensor_of_each_point(tmp_path) -> None:
     lidar, radar = Scan.of(scene(50)), radar_frame()
     fused = fuse(lidar, radar, PLACE, channels=["rcs", "doppler"])

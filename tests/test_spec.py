@@ -42,8 +42,8 @@ TEXTS = st.text(st.characters(exclude_characters="\0"))
 
 four_numbers = st.tuples(*[st.floats(-1e6, 1e6)] * 4)
 specs = st.builds(
-    lambda classes, share, **parts: Spec(
-        classes=classes, rain=tuple(sorted(classes)[: round(share * len(classes))]), **parts
+    lambda classes, share, **parts: replace(
+        SPEC, classes=classes, rain=tuple(sorted(classes)[: round(share * len(classes))]), **parts
     ),
     network=TEXTS,
     view=st.fixed_dictionaries(
@@ -55,7 +55,6 @@ specs = st.builds(
     share=st.floats(0, 1),
     data=TEXTS,
     licence=TEXTS,
-    channels=st.just(("x", "y", "z", "intensity")),
     units=st.tuples(*[TEXTS] * 4),
     rule=st.dictionaries(TEXTS, st.floats(-1e6, 1e6)),
     threshold=st.floats(0, 1),

@@ -77,6 +77,7 @@ def test_a_checkpoint_as_salsanext_saves_it_comes_with_its_grid(succeed, random_
     ("network", "weights", "options", "reason"),
     [
         ("resnet", "published.pt", ("wads",), "resnet: no such network. Available: lisnownet"),
+        ("cues", "published.pt", ("wads",), "cues: no weights of it were published. Available: l"),
         ("outdet", "none.pt", ("wads",), "none.pt: there is no such file"),
         ("outdet", "published.pt", ("mars",), "mars: no such data card. Give a YAML file or one"),
         ("outdet", "published.pt", ("rehearse3d",), "the data card has no statistics"),

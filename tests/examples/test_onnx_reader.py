@@ -71,10 +71,7 @@ def test_of_images_it_makes_what_derain_makes_whichever_way_scores_come_back(
 
 @pytest.mark.parametrize(
     "change",
-    [
-        {"channels": ("x", "y", "dual_return")},
-        {"view": {"kind": "voxels"}},
-    ],
+    [{"channels": ("x", "y", "dual_return")}, {"view": {"kind": "voxels"}}],
     ids=["a former channel", "another view"],
 )
 def test_what_it_does_not_know_is_refused(reader, tmp_path, change) -> None:
@@ -114,11 +111,3 @@ def test_the_contract_names_all_that_a_file_may_hold() -> None:
     assert {f'"kind": "{view}"' in CONTRACT for view in VIEWS} == {True}
     assert {f'"{way}":' in CONTRACT for way in BACK_PROJECTIONS} == {True}
     assert set(Derainer().metadata) <= named
-
-
-def test_the_python_of_the_contract_runs(tmp_path, monkeypatch, capsys) -> None:
-    (tmp_path / "model.onnx").write_bytes(default_model().read_bytes())
-    monkeypatch.chdir(tmp_path)
-    (snippet,) = re.findall(r"```python\n(.*?)```", CONTRACT, re.DOTALL)
-    exec(snippet, {})
-    assert "'neighbours': 9" in capsys.readouterr().out

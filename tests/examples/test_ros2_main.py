@@ -2,7 +2,6 @@
 
 import runpy
 import sys
-from pathlib import Path
 from types import ModuleType
 
 import pytest
@@ -10,9 +9,7 @@ import pytest
 from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
 
-from .made_up_ros import EXAMPLE, ExternalShutdownError, Node, Ros, message_of
-
-KEPT = Path(__file__).parents[1] / "export" / "kept" / "outdet.onnx"
+from .made_up_ros import EXAMPLE, KEPT, ExternalShutdownError, Node, Ros, message_of
 
 
 def run_main(ros2_node: ModuleType, patch: pytest.MonkeyPatch, ros: Ros) -> int:

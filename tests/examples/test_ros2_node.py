@@ -2,7 +2,6 @@
 
 import array
 from dataclasses import replace
-from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -13,6 +12,7 @@ from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
 
 from .made_up_ros import (
+    KEPT,
     POINT,
     DiagnosticArray,
     DiagnosticStatus,
@@ -22,8 +22,6 @@ from .made_up_ros import (
     PointCloud2,
     message_of,
 )
-
-KEPT = Path(__file__).parents[1] / "export" / "kept" / "outdet.onnx"
 
 
 def bytes_of_points(message: PointCloud2) -> NDArray[np.void]:

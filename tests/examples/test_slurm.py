@@ -20,10 +20,7 @@ FIT = ["--config", "outdet_wads.yaml", "--data.root", "my scans"]
 
 def started(folder: Path) -> list[str]:
     """Runs the script in a folder as SLURM does; returns the words of what it has started."""
-    commands = {
-        "scontrol": "echo node07; echo node08",
-        "srun": r"""printf '%s\n' "$@" """,
-    }
+    commands = {"scontrol": "echo node07; echo node08", "srun": r"""printf '%s\n' "$@" """}
     for name, line in commands.items():
         command = folder / "bin" / name
         command.parent.mkdir(exist_ok=True)

@@ -113,15 +113,6 @@ def test_it_is_benched_beside_others(run_derain, model, root, tmp_path, monkeypa
     assert iou["toy"] > 0.8 > iou["none"]
 
 
-def test_nothing_of_it_was_published(run_derain, toy_network, tmp_path) -> None:
-    out = tmp_path / "toy.ckpt"
-    outcome = run_derain("import-weights", "toy", "toy.pt", "--stats", "wads", "--out", out)
-    assert (outcome.code, outcome.out) == (2, "")
-    assert outcome.err == (
-        "derain: toy: no weights of it were published. Available: lisnownet, outdet, salsanext.\n"
-    )
-
-
 def test_without_the_package_that_brings_it_its_checkpoint_is_refused(
     run_derain, checkpoint, monkeypatch
 ) -> None:

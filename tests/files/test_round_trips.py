@@ -108,19 +108,14 @@ def check_text(path: Path, scan: Scan) -> None:
     """Text gives back the values of a scan: whole numbers and others, each in 64 bits."""
     write_scan(path, scan)
     copy = read_scan(path)
-    assert list(copy.fields) == list(scan.fields)
+    # Compared as the type that was written: int64 and uint64 have no common one without loss.
+    narrow = {name: each.astype(scan.fields[name].dtype) for name, each in copy.fields.items()}
+    check_same(replace(copy, fields=narrow), scan, payload=False)
     for name, column in scan.fields.items():
-        other = copy.fields[name]
         whole = len(scan) > 0 and column.dtype.kind != "f"
-        assert other.dtype.kind in ("iu" if whole else "f")
-        assert other.dtype.itemsize == 8
-        # Compared as the type that was written: int64 and uint64 have no common one without loss.
-        np.testing.assert_array_equal(other.astype(column.dtype), column, strict=True)
+        assert copy.fields[name].dtype in ((np.int64, np.uint64) if whole else (np.float64,))
         if column.dtype.kind == "f":
-            np.testing.assert_array_equal(other, column.astype(np.float64))
-            known = ~np.isnan(column)
-            np.testing.assert_array_equal(np.signbit(other[known]), np.signbit(column[known]))
-    np.testing.assert_array_equal(copy.xyz, scan.xyz)
+            np.testing.assert_array_equal(copy.fields[name], column.astype(np.float64))
 
 
 @EXAMPLES

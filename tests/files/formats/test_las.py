@@ -39,11 +39,7 @@ def write(
     return las
 
 
-def millimetres(*rows: tuple[int, int, int]) -> NDArray[np.int32]:
-    return np.array(rows, np.int32).reshape(-1, 3)
-
-
-STREET = millimetres((1, -2, 3), (30_001, -40_002, 1_700), (-(2**31), 2**31 - 1, 0), (5, 6, 7))
+STREET = np.int32([(1, -2, 3), (30_001, -40_002, 1_700), (-(2**31), 2**31 - 1, 0), (5, 6, 7)])
 
 
 @pytest.mark.parametrize("version", ["1.2", "1.4"])

@@ -90,14 +90,10 @@ def test_headers_may_lack_what_is_optional_and_hold_comments_in_any_encoding(fil
 
 def test_padding_is_passed_over_in_every_encoding(file) -> None:
     header = (
-        HEADER.replace("FIELDS x y z", "FIELDS x y z _")
-        .replace("SIZE 4 4 4", "SIZE 4 4 4 1")
-        .replace("TYPE F F F", "TYPE F F F U")
-        .replace("COUNT 1 1 1", "COUNT 1 1 1 4")
-        .replace(" intensity", " intensity _")
-        .replace(" 2\nTYPE", " 2 4\nTYPE")
-        .replace(" U\nCOUNT", " U F\nCOUNT")
-        .replace(" 1\nWIDTH", " 1 2\nWIDTH")
+        HEADER.replace("FIELDS x y z intensity", "FIELDS x y z _ intensity _")
+        .replace("SIZE 4 4 4 2", "SIZE 4 4 4 1 2 4")
+        .replace("TYPE F F F U", "TYPE F F F U U F")
+        .replace("COUNT 1 1 1 1", "COUNT 1 1 1 4 1 2")
     )
     rows = [struct.pack("<fff4xH8x", *point) for point in POINTS]
     block = column_by_column()
