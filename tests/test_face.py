@@ -7,7 +7,6 @@ import pydoc
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
@@ -31,18 +30,6 @@ OFFERED = [name for name in derain.__all__ if name != "__version__"]
 
 # What an example may use without an import, besides what its module has.
 NAMES = {"derain": derain, "np": np, "torch": torch, "Trainer": Trainer}
-
-
-@pytest.fixture
-def examples_folder(tmp_path, monkeypatch) -> Iterator[Path]:
-    """A folder with what examples read, in which they run, on random numbers of their own."""
-    prepare(tmp_path)
-    monkeypatch.chdir(tmp_path)
-    # Where rich is installed, as with import-linter, Lightning prints a table of every model.
-    connector = "lightning.pytorch.trainer.connectors.callback_connector"
-    monkeypatch.setattr(f"{connector}._RICH_AVAILABLE", False)
-    with torch.random.fork_rng(devices=[]):
-        yield tmp_path
 
 
 def run(code: str) -> subprocess.CompletedProcess[str]:
@@ -117,15 +104,19 @@ def test_help_shows_every_name_and_what_it_is() -> None:
     assert "Calls a point rain if it has few points around it." in text  # of a filter's own help
 
 
-@pytest.mark.usefixtures("examples_folder")
 @pytest.mark.parametrize("name", OFFERED)
-def test_every_name_has_an_example_which_is_true(name) -> None:
+def test_every_name_has_an_example_which_is_true(here, monkeypatch, name) -> None:
+    prepare(here)
+    # Where rich is installed, as with import-linter, Lightning prints a table of every model.
+    connector = "lightning.pytorch.trainer.connectors.callback_connector"
+    monkeypatch.setattr(f"{connector}._RICH_AVAILABLE", False)
     documented = getattr(derain, name)
     own_names = vars(sys.modules[documented.__module__])
     tests = doctest.DocTestFinder().find(documented, name, globs={**own_names, **NAMES})
     assert [test for test in tests if test.name == name and test.examples]
     runner = doctest.DocTestRunner(verbose=False)
     printed: list[str] = []
-    for test in tests:
-        runner.run(test, out=printed.append)
+    with torch.random.fork_rng(devices=[]):
+        for test in tests:
+            runner.run(test, out=printed.append)
     assert not runner.failures, "".join(printed)
