@@ -127,15 +127,6 @@ def test_encoding_viewpoint_and_order_of_columns_survive_and_the_grid_until_it_i
     assert f"WIDTH 3\nHEIGHT 1\n{stated.format(3)}".encode() in file.read_bytes()
 
 
-@pytest.mark.parametrize("encoding", ENCODINGS)
-def test_open3d_reads_what_is_written(file, scan, columns, encoding, open3d) -> None:
-    write_scan(file, replace(scan, header=PcdHeader((), 0, 0, 0, encoding)))
-    cloud = open3d.t.io.read_point_cloud(str(file))
-    np.testing.assert_array_equal(cloud.point["positions"].numpy(), scan.xyz, strict=True)
-    for name in columns.keys() - set("xyz"):
-        np.testing.assert_array_equal(cloud.point[name].numpy().ravel(), columns[name], strict=True)
-
-
 @pytest.mark.parametrize(
     ("stated", "shape"),
     [
