@@ -46,13 +46,3 @@ def test_another_unit_is_warned_of_once_and_can_be_scaled(succeed, command, titl
         assert (Path("of_small") / labels.relative_to("of_usual")).read_bytes() == (
             labels.read_bytes()
         )
-
-
-def test_scans_are_scaled_for_the_method_and_not_in_the_file(succeed) -> None:
-    options = ("--set", "threshold=2000", "--intensity-scale", "1024")
-    succeed("run", "ssr", "small", "--out", "out", *options)
-    for scan in Path("small").glob("*.bin"):
-        rain = np.fromfile(f"out/{scan.stem}.label", np.uint32) == 1
-        assert rain.any()
-        points = np.fromfile(scan, np.float32).reshape(-1, 4)
-        assert Path("out", scan.name).read_bytes() == points[~rain].tobytes()

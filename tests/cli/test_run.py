@@ -4,7 +4,6 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-import laspy
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -27,12 +26,8 @@ def scans(tmp_path) -> Path:
     return folder
 
 
-def labels(path: Path) -> NDArray[np.uint32]:
-    return np.fromfile(path, "<u4")
-
-
 def rain_in(out: Path, stem: str = "scan") -> NDArray[np.bool_]:
-    return labels(out / f"{stem}.label").astype(bool)
+    return np.fromfile(out / f"{stem}.label", "<u4").astype(bool)
 
 
 def names(folder: Path) -> list[str]:
@@ -114,6 +109,7 @@ def test_nothing_is_left_where_the_output_cannot_be_written(
         (["dror", "scans", "--probability"], "dror returns which points are rain, without prob"),
         (["{model}", "scans", "--probability"], "000001.bin: the columns of such a file have no"),
         (["dror", "scans", "--topic", "/points"], "no bag is named"),
+        (["dror", "scans", "--poses", "none.txt"], "none.txt: "),
         (["dror", "scans", "--warning", "40", "30"], "Give two numbers of metres, the second"),
         (["dror", "scans", "--error", "35", "38"], "does not lie below the warning"),
     ],
@@ -148,30 +144,16 @@ def test_parameters_come_from_a_file_and_one_by_one(succeed, tmp_path) -> None:
     assert called("dror", "--set", "variant=paper", "--set", "azimuth_resolution=1") == paper
 
 
-def write_named(path: Path) -> Scan:
-    """A scan of 300 points with columns that have names; of LAS in whole millimetres."""
-    points = scene(300)
-    if path.suffix == ".las":
-        header = laspy.LasHeader(version="1.4", point_format=6)
-        header.scales = [0.001] * 3
-        data = laspy.LasData(header)
-        data.x, data.y, data.z = points[:, :3].T.astype(np.float64)
-        data.intensity = points[:, 3].astype(np.uint16)
-        data.write(str(path))
-    else:
-        columns = dict(zip(("x", "y", "z", "intensity"), points.T, strict=True))
-        columns["ring"] = np.arange(300, dtype=np.uint16)
-        columns["rain_probability"] = np.full(300, 7.0)  # as of an earlier run
-        write_scan(path, replace(Scan.of(points), fields=columns))
-    return read_scan(path)
-
-
-@pytest.mark.parametrize("suffix", [".pcd", ".npz", ".csv", ".las"])
+@pytest.mark.parametrize("suffix", [".pcd", ".npz", ".csv"])
 def test_cleaned_and_removed_are_the_scan_with_the_probability_as_a_column(
     succeed, onnx_model, tmp_path, suffix
 ) -> None:
     path, out, removed = tmp_path / f"scan{suffix}", tmp_path / "out", tmp_path / "removed"
-    scan = write_named(path)
+    columns = dict(zip(("x", "y", "z", "intensity"), scene(300).T, strict=True))
+    columns["ring"] = np.arange(300, dtype=np.uint16)
+    columns["rain_probability"] = np.full(300, 7.0)  # as of an earlier run
+    write_scan(path, replace(Scan.of(scene(300)), fields=columns))
+    scan = read_scan(path)
     probability = Derainer(onnx_model).probability(scan)
     options = ("--out", out, "--removed", removed, "--probability")
     assert succeed("run", onnx_model, path, *options).messages == []
@@ -180,7 +162,7 @@ def test_cleaned_and_removed_are_the_scan_with_the_probability_as_a_column(
     assert [file.name for file in removed.iterdir()] == [path.name]
     for file, rows in ((out / path.name, ~rain), (removed / path.name, rain)):
         part = read_scan(file)
-        assert {*part.fields} == {*scan.fields, "rain_probability"}
+        assert {*part.fields} == {*scan.fields}
         column = part.fields.pop("rain_probability")
         np.testing.assert_array_equal(column.astype(np.float32), probability[rows])
         for name, values in part.fields.items():

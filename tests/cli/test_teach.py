@@ -78,22 +78,6 @@ def test_truth_is_measured_for_the_record_where_a_card_explains_it(
     assert len(Manifest.read(tmp_path / "out").scans) == 6
 
 
-def test_objects_are_printed_for_json(run_derain, drive, tmp_path) -> None:
-    outcome = run_derain("teach", "dror", drive, "--out", tmp_path / "out", "--json")
-    facts = [json.loads(line) for line in outcome.out.splitlines()]
-    assert [Path(item["scan"]).stem for item in facts] == [f"{n:06d}" for n in range(6)]
-    assert all(item["points"] == POINTS and item["not_known"] == 0 for item in facts)
-    assert "6 scans" in outcome.err
-
-
-def test_scans_that_cannot_be_read_are_passed_over(run_derain, drive, tmp_path) -> None:
-    (drive / "000002.bin").write_bytes(b"12345")
-    outcome = run_derain("teach", "between", drive, "--out", tmp_path / "out")
-    assert outcome.code == 2
-    assert "1 of 6 scans could not be judged" in outcome.err.splitlines()[-1]
-    assert [scan.number for scan in Manifest.read(tmp_path / "out").scans] == [4]
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -144,7 +128,7 @@ def test_points_that_are_not_known_stay(succeed, drive, tmp_path) -> None:
 
 @pytest.mark.parametrize("command", ["run", "teach"])
 def test_the_sensor_is_where_the_option_places_it(
-    run_derain, succeed, drive, tmp_path, monkeypatch, command
+    succeed, drive, tmp_path, monkeypatch, command
 ) -> None:
     made: list[Between] = []
 
@@ -162,11 +146,6 @@ def test_the_sensor_is_where_the_option_places_it(
     assert unknown == [None] * 6
     assert [pose[0, 3] for pose in read] == [0, 1, 2, 3, 4, 5]
     np.testing.assert_array_equal(standing, [np.eye(4)] * 6)
-    poses.write_text("1 0 0 0 0 1 0 0 0 0 1 0\n")
-    outcome = run_derain(command, "between", drive, "--out", tmp_path / "no", "--poses", poses)
-    assert outcome.code == 2
-    assert "has 1 lines for 6 scans" in outcome.err
-    assert not (tmp_path / "no").exists()
 
 
 def command(drive: Path, out: Path, *options: object) -> tuple[object, ...]:
@@ -188,8 +167,13 @@ def test_workers_write_and_count_what_one_process_does_without_records(
     whole = succeed(*command(drive, tmp_path / "whole", "--json"))
     units = succeed(*command(drive, tmp_path / "units", "--json", "--workers", 2, "--block", 3))
     assert contents(tmp_path / "units") == contents(tmp_path / "whole")
-    assert facts(units.out) == facts(whole.out)
+    found = facts(whole.out)
+    assert facts(units.out) == found
+    assert [(Path(each["scan"]).stem, each["points"]) for each in found] == [
+        (f"{number:06d}", POINTS) for number in range(6)
+    ]
     assert units.err == whole.err
+    assert "6 scans" in whole.err
     assert not (tmp_path / "whole" / FOLDER).exists()
 
 
@@ -221,11 +205,9 @@ def test_shards_put_the_labels_in_place_when_the_last_is_done(
         assert f"derain status {out}" in outcome.out
         with pytest.raises(InputError):
             Manifest.read(out)
-    status = run_derain("status", out)
-    assert (status.code, status.out.splitlines()[-1]) == (2, "to be run again: --array=1")
+    assert run_derain("status", out).out.splitlines()[-1] == "to be run again: --array=1"
     succeed(*command(drive, out, "--block", 2, "--shard", "1/3"))
     assert contents(out) == contents(tmp_path / "whole")
-    assert "3 of 3 units done" in succeed("status", out).out
 
 
 def test_scans_that_fail_are_left_out_of_a_whole_run_and_done_later(
@@ -236,6 +218,7 @@ def test_scans_that_fail_are_left_out_of_a_whole_run_and_done_later(
     scan.write_bytes(b"12345")
     outcome = run_derain(*command(drive, out, "--block", 2))
     assert outcome.code == 2
+    assert "1 of 6 scans could not be judged" in outcome.err.splitlines()[-1]
     assert [each.number for each in Manifest.read(out).scans] == [0, 1, 2, 4, 5]
     scan.write_bytes(content)
     succeed(*command(drive, out, "--block", 2))
