@@ -1,7 +1,6 @@
 """Recordings are labelled by the answers of a method, and by nothing else."""
 
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -25,21 +24,11 @@ from derain.sources.source import Frames, Source
 
 POINTS = 200
 
-MakeDrive = Callable[..., Path]
-
 
 @pytest.fixture
-def make_drive(tmp_path) -> MakeDrive:
-    """Writes a recording of some scans, and labels of WADS if asked: every tenth point is snow."""
-
-    def make(name: str = "drive", scans: int = 6, labelled: bool = False) -> Path:
-        folder = write_scenes(tmp_path / name / "velodyne", *scans * [POINTS])
-        truth = np.where(np.arange(POINTS) % 10, 40, 110)
-        for number in range(scans if labelled else 0):
-            write_labels(folder.parent / f"labels/{number:06d}.label", truth)
-        return folder
-
-    return make
+def drive(tmp_path) -> Path:
+    """A recording of six scans."""
+    return write_scenes(tmp_path / "drive/velodyne", *6 * [POINTS])
 
 
 def of(drive: Path) -> Source:
@@ -60,8 +49,8 @@ def test_labels_are_rain_not_rain_and_not_known() -> None:
 
 
 @pytest.mark.parametrize("make", [Between, lambda: FilterDerainer(DROR(), 1)])
-def test_labels_are_the_answers_of_the_method(make, make_drive, tmp_path) -> None:
-    drive, out = make_drive(), tmp_path / "taught"
+def test_labels_are_the_answers_of_the_method(make, drive, tmp_path) -> None:
+    out = tmp_path / "taught"
     manifest = teach(make(), of(drive), out)
     keys = [scan.key for scan in manifest.scans]
     for frame, judgement, _ in judgements(make(), named_frames([drive])):
@@ -78,22 +67,23 @@ def test_labels_are_the_answers_of_the_method(make, make_drive, tmp_path) -> Non
     assert {*contents(out)} == {CARD, TAUGHT_MANIFEST, *(f"{LABELS}/{key}.label" for key in keys)}
 
 
-def test_the_card_explains_the_labels(make_drive, tmp_path) -> None:
-    teach(Between(), of(make_drive()), tmp_path / "plain")
+def test_the_card_explains_the_labels(drive, tmp_path) -> None:
+    teach(Between(), of(drive), tmp_path / "plain")
     card = load_card(tmp_path / "plain" / CARD)
     assert (card.rain, card.unknown, {*card.classes}) == ((1,), (255,), {0, 1, 255})
     assert not card.has_statistics
     wads = load_card("wads")
-    teach(Between(), of(make_drive("other")), tmp_path / "wads", wads)
+    teach(Between(), of(drive), tmp_path / "wads", wads)
     card = load_card(tmp_path / "wads" / CARD)
     assert card.name == "WADS taught by between"
     assert (card.intensity_unit, card.deduplicate) == (wads.intensity_unit, wads.deduplicate)
     assert wads.licence in card.licence
 
 
-def test_truth_changes_no_byte(make_drive, tmp_path) -> None:
-    drive = make_drive(labelled=True)
+def test_truth_changes_no_byte(drive, tmp_path) -> None:
     truth = drive.parent / LABELS
+    for path in drive.iterdir():  # every tenth point is snow
+        write_labels(truth / f"{path.stem}.label", np.where(np.arange(POINTS) % 10, 40, 110))
     teach(Between(), of(drive), tmp_path / "with")
     for file in truth.iterdir():
         file.write_bytes(b"garbage")
@@ -107,10 +97,7 @@ def test_truth_changes_no_byte(make_drive, tmp_path) -> None:
     )
 
 
-@pytest.mark.parametrize("labelled", [True, False])
-def test_labels_of_the_recording_stay(make_drive, labelled) -> None:
-    drive = make_drive(labelled=labelled)
-    (drive.parent / LABELS).mkdir(exist_ok=True)
+def test_labels_are_not_written_among_the_scans(drive) -> None:
     before = contents(drive.parent)
     with pytest.raises(InputError):
         teach(Between(), of(drive), drive.parent)
@@ -118,17 +105,17 @@ def test_labels_of_the_recording_stay(make_drive, labelled) -> None:
 
 
 @pytest.mark.parametrize("name", [CARD, TAUGHT_MANIFEST, f"{LABELS}/000000.label"])
-def test_what_is_no_teachers_stays(make_drive, tmp_path, name) -> None:
+def test_what_is_no_teachers_stays(drive, tmp_path, name) -> None:
     out = tmp_path / "out"
     (out / name).parent.mkdir(parents=True)
     (out / name).write_text("mine")
     with pytest.raises(InputError, match="exists, and `derain teach` did not write it"):
-        teach(Between(), of(make_drive()), out)
+        teach(Between(), of(drive), out)
     assert contents(out) == {name: b"mine"}
 
 
-def test_a_second_teaching_takes_the_place_of_the_first(make_drive, tmp_path) -> None:
-    drive, out = make_drive(scans=6), tmp_path / "taught"
+def test_a_second_teaching_takes_the_place_of_the_first(drive, tmp_path) -> None:
+    out = tmp_path / "taught"
     teach(Between(), of(drive), out)
     teach(FilterDerainer(DROR(), 1), of(drive)[:4], out)
     teach(FilterDerainer(DROR(), 1), of(drive)[:4], tmp_path / "alone")
@@ -136,8 +123,8 @@ def test_a_second_teaching_takes_the_place_of_the_first(make_drive, tmp_path) ->
 
 
 @pytest.mark.parametrize("there", [True, False])
-def test_what_fails_half_way_leaves_what_was_there(make_drive, tmp_path, there) -> None:
-    drive, out = make_drive(), tmp_path / "taught"
+def test_what_fails_half_way_leaves_what_was_there(drive, tmp_path, there) -> None:
+    out = tmp_path / "taught"
     if there:
         teach(Between(), of(drive), out)
     before = contents(out)
@@ -149,9 +136,9 @@ def test_what_fails_half_way_leaves_what_was_there(make_drive, tmp_path, there) 
 
 
 def test_what_is_interrupted_while_it_is_put_in_place_is_known(
-    make_drive, tmp_path, monkeypatch
+    drive, tmp_path, monkeypatch
 ) -> None:
-    drive, out = make_drive(), tmp_path / "taught"
+    out = tmp_path / "taught"
     teach(Between(), of(drive), out)
 
     def interrupted(*_: object) -> None:
@@ -167,11 +154,9 @@ def test_what_is_interrupted_while_it_is_put_in_place_is_known(
     assert Manifest.read(out).teacher["method"] == "dror"
 
 
-def test_where_nothing_is_known_or_scans_are_in_no_file_nothing_is_written(
-    make_drive, tmp_path
-) -> None:
+def test_where_nothing_is_known_or_scans_are_in_no_file_nothing_is_written(drive, tmp_path) -> None:
     with pytest.raises(InputError, match="is sure of no point"):
-        teach(Between(Dimmer(sure_within=0.0)), of(make_drive()), tmp_path / "out")
+        teach(Between(Dimmer(sure_within=0.0)), of(drive), tmp_path / "out")
     in_memory = Frames.of_scans([Scan.of(scene(9), name="mine")] * 3)
     with pytest.raises(InputError, match="is not in a file"):
         teach(Between(), in_memory, tmp_path / "out")
