@@ -125,23 +125,15 @@ def test_a_file_that_cannot_be_read_keeps_no_other_from_being_described(
     ]
 
 
-@pytest.fixture
-def recording(tmp_path) -> Recording:
-    """A labelled scan of a sensor of two returns: the nearer of two is snow on every other ray."""
+def test_rays_of_two_returns_are_counted_and_by_labels_what_lies_behind_rain(
+    facts_of, tmp_path
+) -> None:
     recording = Recording(0)
     _, nearer, _ = recording.truth()
     snow = nearer & (recording.ray % 2 == 0)
     write_scan(tmp_path / "dual.npz", Scan.of(recording.xyz))
     write_labels(tmp_path / "dual.label", np.where(snow, 110, 0))
-    return recording
-
-
-def test_rays_of_two_returns_are_counted_and_by_labels_what_lies_behind_rain(
-    facts_of, tmp_path, recording
-) -> None:
-    _, nearer, _ = recording.truth()
-    rays, dual = len(np.unique(recording.ray)), int(nearer.sum())
-    met = int((nearer & (recording.ray % 2 == 0)).sum())
+    rays, dual, met = len(np.unique(recording.ray)), int(nearer.sum()), int(snow.sum())
     counted = {
         "found by": "directions",
         "rays": rays,

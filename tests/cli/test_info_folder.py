@@ -74,8 +74,7 @@ def test_units_are_counted_as_one_process_counts_and_not_again(
         for number in (0, 1)
     )
     assert "derain status" in succeed(*first).out
-    status = run_derain("status", tmp_path / "counts")
-    assert (status.code, "2 of 3 units done" in status.out) == (2, True)
+    assert "2 of 3 units done" in run_derain("status", tmp_path / "counts").out
     assert succeed(*last).out == table
     label = data_set / "sequences/001/lidar_radar_labels/000000.label"
     write_labels(label, np.full(100, 7))  # other inputs, the same counts
