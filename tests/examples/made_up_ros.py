@@ -14,12 +14,8 @@ KEPT = Path(__file__).parents[1] / "export" / "kept" / "outdet.onnx"
 
 # x, y, z, 4 bytes of nothing, intensity, ring, and a byte more.
 POINT = np.dtype(
-    {
-        "names": ["x", "y", "z", "intensity", "ring"],
-        "formats": ["<f4", "<f4", "<f4", "<f4", "<u2"],
-        "offsets": [0, 4, 8, 16, 20],
-        "itemsize": 23,
-    }
+    [(name, "<f4") for name in "xyz"]
+    + [("", "V4"), ("intensity", "<f4"), ("ring", "<u2"), ("", "V1")]
 )
 FLOAT32, UINT16 = 7, 4
 
@@ -135,12 +131,13 @@ class Node:
 def message_of(points: NDArray[np.float32], height: int = 1, gap: int = 0) -> PointCloud2:
     """A message of (N, 4) points in rows, each followed by a gap of so many bytes."""
     table = np.frombuffer(np.random.default_rng(0).bytes(len(points) * 23), POINT).copy()
-    for place, name in enumerate(("x", "y", "z", "intensity")):
+    names = ("x", "y", "z", "intensity")
+    for place, name in enumerate(names):
         table[name] = points[:, place]
     width = len(points) // height
     rows = np.frombuffer(table.tobytes(), np.uint8).reshape(height, width * 23)
     rows = np.pad(rows, ((0, 0), (0, gap)), constant_values=7)
-    fields = [Field(name, POINT.fields[name][1], FLOAT32, 1) for name in POINT.names[:4]]
+    fields = [Field(name, POINT.fields[name][1], FLOAT32, 1) for name in names]
     return PointCloud2(
         SimpleNamespace(stamp="now", frame_id="lidar"),
         height,
