@@ -1,13 +1,12 @@
 """``derain annotate`` labels the scans of one sequence."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from textwrap import dedent
-from typing import Any
 
 import numpy as np
 import pytest
+from recorded_scenes import write_scenes
 
 from derain.annotation.scene import read_scene
 from derain.cli.main import module_of
@@ -27,35 +26,24 @@ corrections:
 """
 
 
-@pytest.fixture
-def sequence(tmp_path) -> Path:
-    """A sequence of three scans: a road, a wall and drops, and its labels by another hand."""
-    folder = tmp_path / "data" / "sequences" / "003"
-    for number in range(3):
-        write_scan(folder / f"lidar_radar_pcd/{number:06d}.bin", Scan.of(scene(2000, number)))
-    (tmp_path / "scene.yaml").write_text(SCENE)
-    return folder
+SEQUENCE = Path("data/sequences/003")
+ANNOTATE = ("annotate", SEQUENCE, "--scene", "scene.yaml", "--out")
 
 
-@pytest.fixture
-def annotate(succeed, tmp_path, sequence) -> Callable[..., Any]:
-    """Labels the sequence."""
-
-    def run(out: Path, *options: str | Path) -> Any:
-        command = ["annotate", sequence, "--scene", tmp_path / "scene.yaml", "--out", out]
-        return succeed(*command, *options)
-
-    return run
+@pytest.fixture(autouse=True)
+def _sequence(here) -> None:
+    """A sequence of three scans: a road, a wall and drops."""
+    write_scenes(SEQUENCE / "lidar_radar_pcd", *3 * [2000])
+    Path("scene.yaml").write_text(SCENE)
 
 
 def labels(out: Path, points: int = 2000) -> list[np.ndarray]:
     return [semantic(read_labels(path, points)) for path in sorted(out.glob("*.label"))]
 
 
-def test_a_sequence_is_labelled_counted_and_drawn(annotate, tmp_path, sequence) -> None:
-    out = tmp_path / "out"
-    outcome = annotate(out, "--json")
-    report = json.loads(outcome.out)
+def test_a_sequence_is_labelled_counted_and_drawn(succeed) -> None:
+    out = Path("out")
+    report = json.loads(succeed(*ANNOTATE, out, "--json").out)
     found = labels(out)
     assert (report["sequence"], report["scans"], report["points"]) == ("003", 3, 6000)
     assert report["points_by_class"]["rain"] == np.sum(np.array(found) == TrackClass.RAIN)
@@ -66,64 +54,63 @@ def test_a_sequence_is_labelled_counted_and_drawn(annotate, tmp_path, sequence) 
         "003.png",
     ]
     for number, label in enumerate(found):
-        xyz = read_scan(sequence / f"lidar_radar_pcd/{number:06d}.bin").xyz
+        xyz = read_scan(SEQUENCE / f"lidar_radar_pcd/{number:06d}.bin").xyz
         aside = np.abs(xyz[:, 1]) > 10.1
         assert (label[aside] == TrackClass.BACKGROUND).all()
         low = (xyz[:, 2] < -1.75) & (np.abs(xyz[:, 1]) < 9.9) & (xyz[:, 0] < 39) & (xyz[:, 0] > 3)
         assert (label[low] == TrackClass.ROAD).mean() > 0.99
 
 
-def test_the_text_holds_the_plane_and_the_points_by_class(annotate, tmp_path) -> None:
-    lines = annotate(tmp_path / "out", "--no-picture").out.splitlines()
+def test_the_text_holds_the_plane_and_the_points_by_class(succeed) -> None:
+    lines = succeed(*ANNOTATE, "out", "--no-picture").out.splitlines()
     assert lines[0] == "sequence 003: 3 scans, 6,000 points"
     assert lines[1].startswith("road: 1.")
     counts = {line.split()[0]: line.split()[1] for line in lines[2:]}
     assert list(counts) == [*(kind.name.lower() for kind in TrackClass), "unknown"]
     assert sum(int(count.replace(",", "")) for count in counts.values()) == 6000
-    assert not list((tmp_path / "out").glob("*.png"))
+    assert not list(Path("out").glob("*.png"))
 
 
-def test_corrections_are_those_of_the_sequence_named(annotate, tmp_path) -> None:
+def test_corrections_are_those_of_the_sequence_named(succeed) -> None:
     rain = {}
     for name in ("003", "007"):
-        annotate(tmp_path / name, "--no-picture", "--sequence", name)
-        rain[name] = np.sum(np.array(labels(tmp_path / name)) == TrackClass.RAIN)
+        succeed(*ANNOTATE, name, "--no-picture", "--sequence", name)
+        rain[name] = np.sum(np.array(labels(Path(name))) == TrackClass.RAIN)
     assert rain["007"] > rain["003"] + 1000  # nothing keeps the wall from being rain
 
 
-def test_radar_points_take_the_label_of_the_nearest_point(annotate, tmp_path) -> None:
+def test_radar_points_take_the_label_of_the_nearest_point(succeed) -> None:
     points = scene(2000, 1)[::100]
     points[-1] = (500, 0, 0, 0)
-    write_scan(tmp_path / "radar/000001.bin", Scan.of(points))
-    out = tmp_path / "out"
-    annotate(out, "--no-picture", "--radar", tmp_path / "radar")
+    write_scan(Path("radar/000001.bin"), Scan.of(points))
+    out = Path("out")
+    succeed(*ANNOTATE, out, "--no-picture", "--radar", "radar")
     (radar,) = labels(out / "radar", 20)
     assert radar[:-1].tolist() == labels(out)[1][::100][:-1].tolist()
     assert radar[-1] == UNKNOWN
 
 
-def test_the_scene_file_of_the_help_can_be_read(tmp_path) -> None:
+def test_the_scene_file_of_the_help_can_be_read() -> None:
     _, text = (module_of("annotate").__doc__ or "").split("up):\n")
     example, _ = text.split("The classes are")
-    (tmp_path / "scene.yaml").write_text(dedent(example))
-    scene = read_scene(tmp_path / "scene.yaml")
+    Path("scene.yaml").write_text(dedent(example))
+    scene = read_scene(Path("scene.yaml"))
     assert set(scene.boxes) == {"car_1", "mast_1"}
     assert scene.rain_area is not None
     assert scene.in_sequence("003").boxes["car_1"].centre == (20.2, 1, -0.6)
     assert all(kind.name.lower() in text for kind in TrackClass)
 
 
-def test_labels_that_came_with_the_scans_are_not_overwritten(refused, tmp_path, sequence) -> None:
+def test_labels_that_came_with_the_scans_are_not_overwritten(refused) -> None:
     for own in ("lidar_radar_pcd", "lidar_radar_labels", "labels"):
-        (sequence / own).mkdir(exist_ok=True)
-        before = sorted(sequence.rglob("*"))
-        refused("annotate", sequence, "--scene", tmp_path / "scene.yaml", "--out", sequence / own)
-        assert sorted(sequence.rglob("*")) == before
+        (SEQUENCE / own).mkdir(exist_ok=True)
+        before = sorted(SEQUENCE.rglob("*"))
+        refused(*ANNOTATE, SEQUENCE / own)
+        assert sorted(SEQUENCE.rglob("*")) == before
 
 
-def test_a_radar_frame_of_no_scan_is_refused(refused, tmp_path, sequence) -> None:
-    write_scan(tmp_path / "radar/000009.bin", Scan.of(scene(20)))
-    arguments = ["--scene", tmp_path / "scene.yaml", "--out", tmp_path / "out"]
-    line = refused("annotate", sequence, *arguments, "--radar", tmp_path / "radar")
+def test_a_radar_frame_of_no_scan_is_refused(refused) -> None:
+    write_scan(Path("radar/000009.bin"), Scan.of(scene(20)))
+    line = refused(*ANNOTATE, "out", "--radar", "radar")
     assert "000009.bin: no scan has its name" in line
-    assert not (tmp_path / "out").exists()
+    assert not Path("out").exists()

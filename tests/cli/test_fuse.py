@@ -1,9 +1,7 @@
 """``derain fuse``: folders of two sensors become one, frame by frame, by their clocks."""
 
 import csv
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +15,10 @@ from derain.fusion import UNKNOWN
 PLACE = Extrinsics.of_pose(0.5, 0, -0.7, 0, 0, 90)
 COLUMNS = "x,y,z,doppler,rcs,range,azimuth,elevation,probability,class"
 
-Fuse = Callable[..., Any]
+FUSE = [
+    *("fuse", "--lidar", "lidar", "--radar", "radar", "--extrinsics", "radar.yaml"),
+    *("--out", "out"),
+]
 
 
 def write_times(folder: Path, times: list[float]) -> None:
@@ -30,37 +31,23 @@ def read_rows(file: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(lines))
 
 
-@pytest.fixture
-def recording(tmp_path) -> Path:
+@pytest.fixture(autouse=True)
+def _recording(here) -> None:
     """Three LiDAR scans at 10 Hz, five radar frames that start and end between them."""
     for sensor in ("lidar", "radar", "labels"):
-        (tmp_path / sensor).mkdir()
+        Path(sensor).mkdir()
     for number in range(3):
-        scene(40, seed=number).tofile(tmp_path / f"lidar/{number:06d}.bin")
-        write_labels(tmp_path / f"labels/{number:06d}.label", np.arange(40) % 8, np.arange(40))
+        scene(40, seed=number).tofile(f"lidar/{number:06d}.bin")
+        write_labels(Path(f"labels/{number:06d}.label"), np.arange(40) % 8, np.arange(40))
     for number in range(5):
-        scene(12, seed=100 + number).tofile(tmp_path / f"radar/{number:06d}.bin")
-    write_times(tmp_path / "lidar", [0.0, 0.1, 0.2])
-    write_times(tmp_path / "radar", [-0.03, 0.06, 0.09, 0.12, 0.26])
-    (tmp_path / "radar.yaml").write_text("{x: 0.5, y: 0, z: -0.7, roll: 0, pitch: 0, yaw: 90}")
-    return tmp_path
+        scene(12, seed=100 + number).tofile(f"radar/{number:06d}.bin")
+    write_times(Path("lidar"), [0.0, 0.1, 0.2])
+    write_times(Path("radar"), [-0.03, 0.06, 0.09, 0.12, 0.26])
+    Path("radar.yaml").write_text("{x: 0.5, y: 0, z: -0.7, roll: 0, pitch: 0, yaw: 90}")
 
 
-@pytest.fixture
-def run_fuse(run_derain, recording, monkeypatch) -> Fuse:
-    """Fuses the recording."""
-    monkeypatch.chdir(recording)
-
-    def run(*options: str | Path) -> Any:
-        folders = ["--lidar", "lidar", "--radar", "radar", "--extrinsics", "radar.yaml"]
-        return run_derain("fuse", *folders, "--out", "out", *options)
-
-    return run
-
-
-def test_each_scan_is_joined_by_the_radar_frame_nearest_in_time(run_fuse) -> None:
-    outcome = run_fuse()
-    assert outcome.code == 0, outcome.err
+def test_each_scan_is_joined_by_the_radar_frame_nearest_in_time(succeed) -> None:
+    outcome = succeed(*FUSE)
     assert "3 scans in" in outcome.out
     assert "1 of them without a radar frame" in outcome.out
     for number, partner in enumerate([0, 2, None]):
@@ -72,11 +59,11 @@ def test_each_scan_is_joined_by_the_radar_frame_nearest_in_time(run_fuse) -> Non
     assert not Path("out/lidar_radar_labels").exists()
 
 
-def test_the_metadata_name_what_was_joined_to_what(run_fuse) -> None:
+def test_the_metadata_name_what_was_joined_to_what(succeed) -> None:
     for sensor in ("lidar", "radar"):
         path = Path(sensor, "metadata.csv")
         path.write_text(path.read_text().replace("frame,timestamp", "stem,seconds"))
-    assert run_fuse("--within", "0.1", "--metadata-columns", "stem,seconds").code == 0
+    succeed(*FUSE, "--within", "0.1", "--metadata-columns", "stem,seconds")
     rows = read_rows(Path("out/lidar_radar_pcd/metadata.csv"))
     assert [row["frame"] for row in rows] == ["000000", "000001", "000002"]
     assert [float(row["timestamp"]) for row in rows] == [0.0, 0.1, 0.2]
@@ -84,21 +71,20 @@ def test_the_metadata_name_what_was_joined_to_what(run_fuse) -> None:
 
 
 @pytest.mark.parametrize("reach", [0.01, 1000])
-def test_labels_reach_as_far_as_an_option_allows_and_instances_are_kept(run_fuse, reach) -> None:
-    assert run_fuse("--labels", "labels", "--label-within", str(reach)).code == 0
+def test_labels_reach_as_far_as_an_option_allows_and_instances_are_kept(succeed, reach) -> None:
+    succeed(*FUSE, "--labels", "labels", "--label-within", str(reach))
     raw = read_labels(Path("out/lidar_radar_labels/000001.label"), 40 + 12)
     np.testing.assert_array_equal(semantic(raw)[:40], np.arange(40) % 8)
     np.testing.assert_array_equal(instance(raw), [*range(40), *[0] * 12])
     np.testing.assert_array_equal(semantic(raw)[40:] != UNKNOWN, reach == 1000)
 
 
-def test_real_radar_detections_keep_their_doppler_and_rcs(run_fuse, shared) -> None:
+def test_real_radar_detections_keep_their_doppler_and_rcs(succeed, shared) -> None:
     detections = np.load(shared / "data/radar/ars548_detections.npy")
     for file in Path("radar").glob("*.bin"):
         file.unlink()
     np.save("radar/000001.npy", detections)
-    outcome = run_fuse("--radar-columns", COLUMNS, "--extra", "doppler,rcs")
-    assert outcome.code == 0, outcome.err
+    succeed(*FUSE, "--radar-columns", COLUMNS, "--extra", "doppler,rcs")
     fused = read_scan(Path("out/lidar_radar_pcd/000001.npz"))
     assert list(fused.fields) == ["x", "y", "z", "intensity", "radar", "doppler", "rcs"]
     is_radar = fused.fields["radar"] == 1
@@ -125,20 +111,16 @@ def put_on_another_clock() -> None:
         (None, ["--metadata-columns", "frame"], "frame is not two names"),
     ],
 )
-def test_what_cannot_be_fused_is_one_line_and_exit_code_2(run_fuse, spoil, options, reason) -> None:
+def test_what_cannot_be_fused_is_one_line_and_exit_code_2(refused, spoil, options, reason) -> None:
     if spoil is not None:
         spoil()
-    outcome = run_fuse(*options)
-    assert (outcome.code, outcome.out) == (2, "")
-    (line,) = [line for line in outcome.err.splitlines() if line.startswith("derain:")]
-    assert reason in line
+    assert reason in refused(*FUSE, *options)
     # Nothing half-written, and no metadata of scans that are not there.
     left = {path.name for path in Path("out").rglob("*") if path.is_file()}
     assert not any(name.startswith(".") or name == "metadata.csv" for name in left)
 
 
-def test_the_input_is_never_overwritten(run_fuse) -> None:
+def test_the_input_is_never_overwritten(refused) -> None:
     Path("lidar").rename("lidar_radar_pcd")
-    outcome = run_fuse("--lidar", "lidar_radar_pcd", "--out", ".")
-    assert (outcome.code, "would overwrite" in outcome.err) == (2, True)
+    assert "would overwrite" in refused(*FUSE, "--lidar", "lidar_radar_pcd", "--out", ".")
     assert Path("lidar_radar_pcd/000000.bin").read_bytes() == scene(40).tobytes()

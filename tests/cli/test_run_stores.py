@@ -14,7 +14,9 @@ from small_bags import small_bag
 
 import derain
 from benchmarks.s3_server import BUCKET, Faults, file_system, s3_server
+from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
+from derain.stores.objects import fetch
 
 FAULTS = Faults()
 OPTIONS = ("--block", 2, "--most-removed", 1)
@@ -138,29 +140,21 @@ def test_what_cannot_be_read_is_listed_and_done_by_the_next_run(
 ) -> None:
     s3.put(f"{drive}/", f"{BUCKET}/drive/", recursive=True)
     command = ("run", "dror", "s3://drives/drive/", "--out", "s3://drives/out", *OPTIONS)
+
+    def fetch_others(objects: Any) -> None:
+        for stored in objects.values():
+            if stored.path.name == "000002.bin":
+                raise InputError(stored.name, "a request failed", "Run it again.")
+        fetch(objects)
+
     with monkeypatch.context() as broken:
-        broken.setattr("derain.stores.mirror.fetch", refusing("000002.bin"))
+        broken.setattr("derain.stores.mirror.fetch", fetch_others)
         outcome = run_derain(*command)
     assert outcome.code == 2
     assert "s3://drives/drive/000002.bin" in outcome.err
     assert f"2 of {SCANS} scans" in outcome.err
-    status = run_derain("status", "s3://drives/out").out
-    assert "2 of 3 units done, 1 failed" in status
+    assert "2 of 3 units done, 1 failed" in run_derain("status", "s3://drives/out").out
     assert f"({SCANS - 2} of them done before)" in succeed(*command).out
-
-
-def refusing(name: str) -> Any:
-    """What fetches objects, but for those of a name."""
-    from derain.errors import InputError
-    from derain.stores.objects import fetch
-
-    def fetch_others(objects: Any) -> None:
-        for stored in objects.values():
-            if stored.path.name == name:
-                raise InputError(stored.name, "a request failed", "Run it again.")
-        fetch(objects)
-
-    return fetch_others
 
 
 @pytest.mark.parametrize(

@@ -11,21 +11,12 @@ from derain.export.runtime import Derainer
 from derain.files import read_scan
 from derain.files.labels import write_labels
 from derain.filters import DROR, FilterDerainer
-from derain.pictures import scan_pictures
 
 
 @pytest.fixture
 def scan(tmp_path, write_labelled) -> Path:
     write_labelled(tmp_path / "velodyne/7.bin", tmp_path / "labels/7.label", rain=110)
     return tmp_path / "velodyne/7.bin"
-
-
-@pytest.fixture
-def saved(monkeypatch) -> list[Figure]:
-    """The figures that are drawn from here on, and not written."""
-    figures: list[Figure] = []
-    monkeypatch.setattr(scan_pictures, "save", lambda figure, path: figures.append(figure))
-    return figures
 
 
 def panels(figure: Figure) -> dict[str, int]:
@@ -38,7 +29,7 @@ def panels(figure: Figure) -> dict[str, int]:
 
 
 def test_methods_are_drawn_with_and_without_truth(
-    succeed, scan, tmp_path, onnx_model, saved
+    succeed, scan, tmp_path, onnx_model, saved_figures
 ) -> None:
     rain = np.arange(300) >= 270
     called = {
@@ -49,7 +40,7 @@ def test_methods_are_drawn_with_and_without_truth(
     methods = ["--methods", f"net={onnx_model}", "dror", "all"]
     for name, card in {"truth.png": ["--card", "wads"], "none.png": []}.items():
         succeed("view", scan, *methods, *card, "--out", tmp_path / name)
-    truth, bare = saved
+    truth, bare = saved_figures
     ious = {
         name: np.count_nonzero(found & rain) / np.count_nonzero(found | rain)
         for name, found in called.items()
@@ -77,11 +68,11 @@ def test_a_card_without_labels_is_refused(refused, tmp_path) -> None:
     assert not (tmp_path / "out.png").exists()
 
 
-def test_points_that_nobody_knows_are_not_judged(succeed, scan, tmp_path, saved) -> None:
+def test_points_that_nobody_knows_are_not_judged(succeed, scan, tmp_path, saved_figures) -> None:
     write_labels(tmp_path / "labels/7.label", np.repeat([255, 0, 3], [100, 170, 30]))
     options = ["--methods", "all", "--card", "rehearse3d", "--out", tmp_path / "out.png"]
     succeed("view", scan, *options)
-    assert panels(saved[0]) == {
+    assert panels(saved_figures[0]) == {
         "input: intensity": 200,
         "truth: 30 points of rain": 200,
         "all: IoU 0.150": 200,
