@@ -152,19 +152,6 @@ def test_channels_do_not_change_who_is_near() -> None:
     np.testing.assert_array_equal(usual.distances, other.distances)
 
 
-def test_packing_keeps_every_scan_to_itself() -> None:
-    rng = np.random.default_rng(2)
-    views = [NeighbourView(4)(Scan.of(rng.normal(size=(n, 4)))) for n in (10, 0, 3, 7)]
-    packed = Neighbourhoods.pack(views)
-    start = 0
-    for view in views:
-        rows = slice(start, start + len(view.points))
-        np.testing.assert_array_equal(packed["neighbours"][rows], view.neighbours + start)
-        np.testing.assert_array_equal(packed["points"][rows], view.points)
-        start = rows.stop
-    assert len(packed["distances"]) == start
-
-
 # In a scene, these hold the drops and some of the road.
 NEAR_AND_LOW = Candidates((Bound("range", most=15.0), Bound("intensity", most=30.0)))
 
@@ -203,28 +190,17 @@ def test_candidates_get_their_own_score_and_all_else_gets_none() -> None:
     np.testing.assert_array_equal(part.judged, whole.judged)
 
 
-def test_packing_keeps_the_candidates_of_every_scan_to_themselves() -> None:
-    view = NeighbourView(4, candidates=NEAR_AND_LOW)
+@pytest.mark.parametrize("candidates", [None, NEAR_AND_LOW], ids=["all", "candidates"])
+def test_packing_keeps_every_scan_to_itself(candidates) -> None:
+    view = NeighbourView(4, candidates=candidates)
     views = [view(Scan.of(scene(n + 10, n)[:n])) for n in (100, 0, 3, 70)]
     packed = Neighbourhoods.pack(views)
-    row = point = candidate = 0
+    begin = dict.fromkeys(packed, 0)
     for one in views:
-        rows, those = slice(row, row + len(one.neighbours)), slice(candidate, candidate + one.size)
-        np.testing.assert_array_equal(packed["neighbours"][rows], one.neighbours + point)
-        np.testing.assert_array_equal(packed["distances"][rows], one.distances)
-        np.testing.assert_array_equal(packed["candidates"][those], one.candidates + row)
-        row, point, candidate = rows.stop, point + len(one.points), those.stop
-    assert (len(packed["points"]), len(packed["candidates"])) == (point, candidate)
-
-
-def test_a_real_scan_agrees_with_scikit_learn(shared) -> None:
-    from sklearn.neighbors import KDTree
-
-    points = np.fromfile(shared / "data/wads/sample.bin", np.float32).reshape(-1, 4)
-    view = NeighbourView()(Scan.of(points))
-    assert sorted(view.first) == list(range(len(points)))
-    some = np.random.default_rng(4).choice(len(points), 3000, replace=False)
-    distances, neighbours = KDTree(points[:, :3]).query(points[some, :3], 9)
-    rows = view.inverse[some]
-    np.testing.assert_allclose(view.distances[rows], distances, atol=1e-5)
-    assert (view.first[view.neighbours[rows]] == neighbours).mean() > 0.9999
+        inputs = one.inputs()
+        shift = {"neighbours": begin["points"], "candidates": begin["neighbours"]}
+        for name, array in inputs.items():
+            rows = packed[name][begin[name] :][: len(array)]
+            np.testing.assert_array_equal(rows, array + shift.get(name, 0))
+        begin = {name: begin[name] + len(array) for name, array in inputs.items()}
+    assert {name: len(array) for name, array in packed.items()} == begin

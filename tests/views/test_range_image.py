@@ -1,6 +1,5 @@
-"""The range view against brute force, with every trouble, and on every real scan."""
+"""The range view against brute force, with every trouble, and on real scans."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +11,10 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases
-from derain.files import DEFAULT_COLUMNS, read_scan
+from derain.files import read_scan
 from derain.files.labels import label_beside, read_labels, semantic
 from derain.scan import Scan
-from derain.views.back_projection import BACK_PROJECTIONS, REACH
+from derain.views.back_projection import BACK_PROJECTIONS, REACH, ProjectedPoints
 from derain.views.candidates import Bound, Candidates
 from derain.views.grid_fit import fit_grid
 from derain.views.range_image import RangeImage, RangeView
@@ -187,43 +186,20 @@ def test_hard_cases_have_finite_images_and_every_judged_row_an_answer(case) -> N
         assert not answered[~scan.valid].any()
 
 
-RADAR = ("x", "y", "z", *(f"column {number}" for number in range(3, 10)))
-REAL_SCANS = [
-    "wads/sample.bin",
-    *(f"wads/sequences/36/velodyne/0422{number}.bin" for number in range(23, 43, 2)),
-    *(f"snowykitti/velodyne/00000{number}.bin" for number in range(3)),
-    "clean/kitti_hdl64.bin",
-    "clean/kitti_front.bin",
-    "clean/pandaset_pandar64.pcd",
-    "clean/ouster_os1_128.npz",
-    "clean/ouster_os0_32_dual.npz",
-    "clean/hesai_at128_front.pcd",
-    "clean/velodyne_vlp16_dual.pcd",
-    "radar/ars548_detections.npy",
-]
-
-
-@pytest.mark.parametrize("name", REAL_SCANS)
-def test_scores_come_back_to_every_point_of_every_real_scan(shared, name) -> None:
-    scan = read_scan(shared / "data" / name, RADAR if name.endswith(".npy") else DEFAULT_COLUMNS)
-    view = RangeView(fit_grid([scan]).grid)
-    image = view(scan)
-    np.testing.assert_array_equal(image.pixel >= 0, scan.valid)
-    # A constant comes back by every way; a vote makes it the share of votes.
-    for back_projection in BACK_PROJECTIONS:
-        back = replace(image, back_projection_name=back_projection).back(
-            np.full(image.size, 0.75, np.float32)
-        )
-        constant = np.float32(1 if back_projection == "vote" else 0.75)
-        np.testing.assert_array_equal(back, np.where(scan.valid, constant, 0))
-    # So does a score of its own for every point that is shown, or is a copy of one.
-    of_pixel = np.random.default_rng(0).random(image.size, np.float32)
-    back = image.back(of_pixel)
-    assert back.shape == (len(scan),)
-    seen = scan.valid & ~image.hidden
-    np.testing.assert_array_equal(back[seen], of_pixel[image.pixel[seen]])
-    winner = image.winner[image.winner >= 0]
-    np.testing.assert_array_equal(image.image[0][image.valid], scan.range[winner])
+@pytest.mark.parametrize("back_projection", BACK_PROJECTIONS)
+@pytest.mark.parametrize("grid", [FULL, FRONT], ids=["full circle", "front"])
+@given(points=clouds)
+def test_scores_come_back_by_the_back_projection_that_is_named(
+    grid, back_projection, points
+) -> None:
+    image = RangeView(grid, back_projection=back_projection)(Scan.of(points))
+    on = np.flatnonzero(image.judged)
+    projected = ProjectedPoints(image.pixel[on], image.range[on], image.nearest, image.wraps)
+    score = np.random.default_rng(0).random(image.size, np.float32)
+    expected = np.zeros(len(points), np.float32)
+    expected[on] = BACK_PROJECTIONS[back_projection](projected, score)
+    np.testing.assert_array_equal(image.back(score), expected)
+    assert image.wraps == (grid is FULL)
 
 
 def labelled(path: Path, snow: int = 110) -> tuple[Scan, NDArray[np.bool_]]:
