@@ -6,11 +6,16 @@ from copy import deepcopy
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
+from itertools import product
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
+import onnx
 import pytest
 
+from derain.export.onnx_file import export, with_metadata
+from derain.export.runtime import Derainer
+from derain.views.back_projection import BACK_PROJECTIONS
 from derain.views.candidates import Bound, Candidates
 
 from .cpp import Program, build, missing_tools, program
@@ -51,13 +56,24 @@ def derain_onnx(built) -> Program:
 @pytest.fixture(scope="session")
 def judging_candidates(random_outdet, candidates, made_once) -> Path:
     """3D-OutDet of random weights, exported with those candidates."""
-    from derain.export.onnx_file import export
-
     model = deepcopy(random_outdet)
     model.adopt(replace(model.spec, candidates=candidates))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("derain.models.outdet.network.BLOCKS", 1)  # traced several times as quickly
         return made_once("examples_candidates.onnx", partial(export, model))
+
+
+@pytest.fixture(params=product(BACK_PROJECTIONS, [None, (-60.0, 75.0)], [True, False]), ids=str)
+def model_of_images(request, salsanext_onnx, candidates, tmp_path) -> Path:
+    """SalsaNext whose scores come back in every way, of a circle or a sector, of all or some."""
+    way_back, sector, of_all = request.param
+    spec = Derainer(salsanext_onnx).spec
+    grid = {**spec.view["grid"], "azimuth": sector or (-180.0, 180.0)}
+    view = {**spec.view, "grid": grid, "way_back": way_back}
+    changed = replace(spec, view=view, candidates=None if of_all else candidates)
+    path = tmp_path / "model.onnx"
+    path.write_bytes(with_metadata(onnx.load(salsanext_onnx), {"spec": changed.as_dict()}))
+    return path
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,6 @@
 """With onnxruntime's headers, the example in C++ judges as derain judges."""
 
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,6 @@ from derain.default import default_model
 from derain.evaluation.hard_cases import scene
 from derain.export.onnx_file import with_metadata
 from derain.export.runtime import Derainer
-from derain.views.back_projection import BACK_PROJECTIONS
 
 from .cpp import Program
 from .hard_points import hard_scans
@@ -51,19 +49,10 @@ def test_it_judges_candidates_as_well(derain_onnx, judging_candidates, tmp_path)
     assert 0 < Derainer(judging_candidates, threads=1)(points).mean() < 1
 
 
-@pytest.mark.parametrize("way_back", BACK_PROJECTIONS)
-@pytest.mark.parametrize("azimuth", [(-180.0, 180.0), (-60.0, 75.0)], ids=["circle", "sector"])
 def test_and_images_whichever_way_their_scores_come_back(
-    derain_onnx, salsanext_onnx, candidates, tmp_path, way_back, azimuth
+    derain_onnx, model_of_images, tmp_path
 ) -> None:
-    proto, spec = onnx.load(salsanext_onnx), Derainer(salsanext_onnx).spec
-    view = {**spec.view, "grid": {**spec.view["grid"], "azimuth": azimuth}, "way_back": way_back}
-    for bounds in (None, candidates):
-        changed = replace(spec, view=view, candidates=bounds)
-        content = with_metadata(proto, {"spec": changed.as_dict()})
-        (tmp_path / "model.onnx").write_bytes(content)
-        scans = [*SCANS.values(), scene(800)]
-        judged_alike(derain_onnx, tmp_path, tmp_path / "model.onnx", scans)
+    judged_alike(derain_onnx, tmp_path, model_of_images, [*SCANS.values(), scene(800)])
 
 
 @pytest.mark.parametrize("text", [b'"numpy"', b'"sha256"'], ids=["versions", "checksum"])

@@ -55,18 +55,10 @@ def test_of_neighbours_it_makes_what_derain_makes(reader, judging_candidates) ->
     assert 0 < Derainer(default_model(), threads=1)(hard_points()).mean() < 0.9
 
 
-@pytest.mark.parametrize("way_back", BACK_PROJECTIONS)
-@pytest.mark.parametrize("azimuth", [(-180.0, 180.0), (-60.0, 75.0)], ids=["circle", "sector"])
 def test_of_images_it_makes_what_derain_makes_whichever_way_scores_come_back(
-    reader, salsanext_onnx, tmp_path, way_back, azimuth, candidates
+    reader, model_of_images
 ) -> None:
-    proto, spec = onnx.load(salsanext_onnx), Derainer(salsanext_onnx).spec
-    grid = {**spec.view["grid"], "azimuth": azimuth}
-    view = {"kind": "range", "grid": grid, "way_back": way_back}
-    for bounds in (None, candidates):
-        changed = replace(spec, view=view, candidates=bounds)
-        (tmp_path / "changed.onnx").write_bytes(with_metadata(proto, {"spec": changed.as_dict()}))
-        agree(reader, tmp_path / "changed.onnx", *SCANS.values(), scene(800))
+    agree(reader, model_of_images, *SCANS.values(), scene(800))
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
 """A network in one file outside derain does all that derain's own networks do."""
 
-import json
 import sys
 from collections.abc import Iterator
 from importlib import import_module
@@ -12,8 +11,6 @@ import pytest
 
 from derain.cli.main import main
 from derain.evaluation.hard_cases import hard_cases, scene
-from derain.export.bench import bench
-from derain.export.bench.cost import measure_in_process
 from derain.export.proof import THREADS
 from derain.export.runtime import Derainer
 from derain.files.labels import write_labels
@@ -100,17 +97,6 @@ def test_what_it_learnt_is_rain_in_scans_it_never_saw(run_derain, model, tmp_pat
     assert outcome.code == 0, outcome.err
     rain = np.fromfile(tmp_path / "out/scan.label", "<u4") == 1
     assert (rain & DROPS).sum() / (rain | DROPS).sum() > 0.8
-
-
-def test_it_is_benched_beside_others(run_derain, model, root, tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(bench, "measure_cost", measure_in_process)
-    options = ["--card", "wads", "--timed", "1", "--repeats", "1", "--out", tmp_path / "out"]
-    test = root / "sequences/03/velodyne"
-    outcome = run_derain("bench", "--data", test, "--methods", model, "none", *options)
-    assert outcome.code == 0, outcome.err
-    rows = json.loads((tmp_path / "out/bench.json").read_text())["rows"]
-    iou = {row["method"]: row["iou"] for row in rows}
-    assert iou["toy"] > 0.8 > iou["none"]
 
 
 def test_without_the_package_that_brings_it_its_checkpoint_is_refused(
