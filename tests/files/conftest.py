@@ -1,21 +1,16 @@
 """What the tests of all formats share."""
 
-from typing import Any
-
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from derain import Scan
 
-Columns = dict[str, NDArray[Any]]
-
 
 @pytest.fixture
-def columns() -> Columns:
+def scan() -> Scan:
     """Five points with columns of many types."""
     generator = np.random.default_rng(0)
-    return {
+    columns = {
         "x": generator.normal(0, 20, 5).astype(np.float32),
         "y": generator.normal(0, 20, 5).astype(np.float32),
         "z": generator.normal(0, 2, 5).astype(np.float32),
@@ -24,10 +19,5 @@ def columns() -> Columns:
         "offset": np.array([-(2**31), -1, 0, 1, 2**31 - 1], np.int32),
         "time": np.array([0.0, 1e-9, 0.1, 1 / 3, 1.7e9 + 1e-6]),
     }
-
-
-@pytest.fixture
-def scan(columns) -> Scan:
-    """The scan of those columns."""
     xyz = np.stack([columns[axis] for axis in "xyz"], axis=1)
     return Scan(xyz, columns["intensity"].astype(np.float32), fields=columns)

@@ -118,8 +118,19 @@ def test_open3d_reads_what_is_written(tmp_path, scan, header, open3d) -> None:
         np.testing.assert_array_equal(cloud.point[name].numpy().ravel(), fields[name], strict=True)
 
 
-def check_text(path: Path, scan: Scan) -> None:
-    """Text gives back the values of a scan: whole numbers and others, each in 64 bits."""
+PLAIN_NAMES = st.text("abcd_ä", min_size=2)
+# With what CSV itself is made of, and with bytes that are not UTF-8.
+CSV_NAMES = st.text("ab;,\"' äλ\udce4", min_size=2, max_size=6).filter(lambda n: n == n.strip())
+
+
+@EXAMPLES
+@pytest.mark.parametrize(
+    ("suffix", "names"),
+    [(".txt", PLAIN_NAMES), (".xyz.gz", PLAIN_NAMES), (".csv", CSV_NAMES)],
+)
+@given(data=st.data())
+def test_text_gives_back_values_in_64_bits(tmp_path, suffix, names, data) -> None:
+    scan, path = data.draw(scans(TEXT_TYPES, names)), tmp_path / f"scan{suffix}"
     write_scan(path, scan)
     copy = read_scan(path)
     # Compared as the type that was written: int64 and uint64 have no common one without loss.
@@ -130,27 +141,6 @@ def check_text(path: Path, scan: Scan) -> None:
         assert copy.fields[name].dtype in ((np.int64, np.uint64) if whole else (np.float64,))
         if column.dtype.kind == "f":
             np.testing.assert_array_equal(copy.fields[name], column.astype(np.float64))
-
-
-@EXAMPLES
-@pytest.mark.parametrize("suffix", [".txt", ".xyz.gz"])
-@given(scan=scans(TEXT_TYPES, st.text("abcd_ä", min_size=2)))
-def test_text(tmp_path, suffix, scan) -> None:
-    check_text(tmp_path / f"scan{suffix}", scan)
-
-
-# Names with what CSV itself is made of, and with bytes that are not UTF-8.
-@EXAMPLES
-@given(
-    scan=scans(
-        TEXT_TYPES,
-        st.text("ab;,\"' äλ\udce4", min_size=2, max_size=6).filter(
-            lambda name: name == name.strip()
-        ),
-    )
-)
-def test_csv(tmp_path, scan) -> None:
-    check_text(tmp_path / "scan.csv", scan)
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".npy", ".pcd", ".ply", ".feather", ".las", ".laz"])
