@@ -5,6 +5,8 @@ from numpy.typing import NDArray
 
 from derain.views.return_columns import LEAST_APART
 
+from .unit_vectors import unit_vectors
+
 
 class Recording:
     """What a sensor of two returns sees, and which of its returns are of one ray.
@@ -20,8 +22,8 @@ class Recording:
         generator = np.random.default_rng(seed)
         azimuth = np.arange(-180, 180, step)
         directions = np.stack(np.meshgrid(azimuth, np.linspace(-20, 20, beams)), axis=-1)
-        directions = np.radians(directions.reshape(-1, 2))
-        directions += generator.normal(0, np.radians(step / 50), directions.shape)
+        directions = directions.reshape(-1, 2)
+        directions += generator.normal(0, step / 50, directions.shape)
         near = generator.uniform(1, 30, len(directions))
         behind = near + generator.uniform(2 * LEAST_APART, 50, len(near))
         second = np.flatnonzero(generator.random(len(near)) < share)
@@ -30,9 +32,7 @@ class Recording:
         self.ray = ray[order]
         self.distance = np.concatenate([near, behind[second]])[order]
         self.two = np.isin(self.ray, second)
-        az, inclination = directions[self.ray].T
-        flat = np.cos(inclination)
-        unit = np.stack([np.cos(az) * flat, np.sin(az) * flat, np.sin(inclination)], axis=1)
+        unit = unit_vectors(*directions[self.ray].T)
         self.xyz = (unit * self.distance[:, None]).astype(np.float32)
 
     def truth(self) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]:

@@ -27,6 +27,8 @@ from derain.simulation.radar import (
 from derain.simulation.rain_field import RainField, SprinkledRain, UniformRain
 from derain.simulation.track import Track
 
+from ..unit_vectors import unit_vectors
+
 pytestmark = pytest.mark.usefixtures("open3d")
 
 DRY = UniformRain(0)
@@ -39,6 +41,14 @@ def plate(x: float, width: float, y: float = 0.0, height: float = 0.6) -> Surfac
     """A square target facing the sensor at a distance in metres, its centre at a height."""
     box = shapes.box(0.01, width, height - width / 2, height + width / 2)
     return Surface(box, TrackClass.TARGET, 0.5).placed(x, y)
+
+
+def in_cell(radar: Radar, row: int, column: int, depth: int, width: float) -> Track:
+    """A square target in the middle of a cell."""
+    inclination, azimuth, distance = radar.centres()
+    direction = unit_vectors(np.degrees(azimuth[column]), np.degrees(inclination[row]))
+    x, y, height = distance[depth] * direction + (0, 0, radar.mounting_height)
+    return Track.of([plate(x, width, y, height)])
 
 
 # Nothing in sight: what is there is behind the radar.
@@ -69,12 +79,7 @@ def test_the_echo_of_a_plate_is_in_proportion_to_its_area_at_any_distance() -> N
 
 def test_an_echo_lies_in_the_cell_that_its_surface_lies_in() -> None:
     radar = Radar()
-    inclination, azimuth, distance = radar.centres()
-    # Towards the middle of the cell in row 3, column 20 at a depth of 80.
-    level = distance[80] * np.cos(inclination[3])
-    x, y = level * np.cos(azimuth[20]), level * np.sin(azimuth[20])
-    height = radar.mounting_height + distance[80] * np.sin(inclination[3])
-    echo, farthest = surface_echoes(Track.of([plate(x, 0.3, y, height)]), radar)
+    echo, farthest = surface_echoes(in_cell(radar, 3, 20, 80, 0.3), radar)
     assert np.argwhere(echo).tolist() == [[TrackClass.TARGET, 3, 20, 80]]
     assert (farthest == radar.maximum_range).all()  # the plate does not fill its cell
 
@@ -111,12 +116,10 @@ def test_a_target_is_detected_as_often_as_by_the_closed_form(reach) -> None:
     # cells: (1 + T / (1 + S))^-N where T = P^(-1/N) - 1 for a false alarm rate of P.
     # Source: Finn and Johnson 1968.
     radar = replace(NARROW, reach=reach, leakage=-100.0)
-    inclination, azimuth, distance = radar.centres()
-    x, y = distance[80] * np.cos(azimuth[4]), distance[80] * np.sin(azimuth[4])
-    track = Track.of([plate(x, 0.4, y, radar.mounting_height + x * math.tan(inclination[2]))])
+    track = in_cell(radar, 2, 4, 80, 0.4)
     echo, _ = surface_echoes(track, radar)
     assert np.argwhere(echo)[:, 3].tolist() == [80]
-    signal = echo.sum() / (distance[80] / reach) ** 4
+    signal = echo.sum() / (radar.centres()[2][80] / reach) ** 4
     cells = 2 * REFERENCE_CELLS
     threshold = radar.false_alarm_rate ** (-1 / cells) - 1
     expected = (1 + threshold / (1 + signal)) ** -cells
@@ -128,10 +131,7 @@ def test_a_target_is_detected_as_often_as_by_the_closed_form(reach) -> None:
 def test_positions_are_off_by_a_share_of_the_cell() -> None:
     radar = replace(NARROW, accuracy=0.1)
     inclination, azimuth, distance = radar.centres()
-    height = radar.mounting_height + distance[60] * math.sin(inclination[1])
-    away = distance[60] * math.cos(inclination[1])
-    x, y = away * math.cos(azimuth[2]), away * math.sin(azimuth[2])
-    scans = frames(Track.of([plate(x, 0.3, y, height)]), radar, 300)
+    scans = frames(in_cell(radar, 1, 2, 60, 0.3), radar, 300)
     points = np.concatenate([scan.xyz[scan.label == TrackClass.TARGET] for scan in scans])
     range_ = np.linalg.norm(points, axis=1)
     azimuths = np.arctan2(points[:, 1], points[:, 0])

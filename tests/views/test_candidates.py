@@ -1,6 +1,7 @@
 """Candidates are the points within all bounds, and are read back as they were written."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from derain.files.documents import Entry
 from derain.scan import Scan
 from derain.spec import Spec
 from derain.views.candidates import Bound, Candidates, bounded_channels, candidates_at, narrower
+
+from ..test_spec import SPEC
 
 numbers = st.none() | st.floats(-50, 50, width=32)
 sides = (
@@ -105,17 +108,12 @@ def test_candidates_are_bounded_by_range_and_height_and_what_the_network_sees() 
 def test_a_spec_refuses_candidates_bounded_by_what_its_network_does_not_see(
     channel, refused
 ) -> None:
-    spec = Spec(
-        network="outdet",
-        view={"kind": "neighbours", "neighbours": 7},
-        mean=(0.0,),
-        std=(1.0,),
-        classes={0: "road", 1: "rain"},
-        rain=(1,),
-        data="somewhere",
-        licence="MIT",
+    spec = replace(
+        SPEC,
         channels=("x",),
         units=("m",),
+        mean=(0.0,),
+        std=(1.0,),
         candidates=Candidates((Bound(channel, most=3.0),)),
     )
     if refused:

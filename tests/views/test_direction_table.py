@@ -11,6 +11,8 @@ from derain.views.direction_table import BINS, BORDER_MARGIN, UNSURE_BELOW, heig
 from derain.views.directions import directions
 from derain.views.spherical_grid import PUBLISHED_GRIDS, SphericalGrid, grid_of
 
+from ..unit_vectors import unit_vectors
+
 PUBLISHED = [grid_of(name, "test") for name in PUBLISHED_GRIDS]
 GRIDS = [
     *PUBLISHED,
@@ -35,14 +37,6 @@ def computed(grid: SphericalGrid, xyz: NDArray[np.float32]) -> NDArray[np.int64]
     return np.where(inside, row * grid.columns + np.minimum(column, grid.columns - 1), -1)
 
 
-def towards(azimuth: NDArray[np.float64], inclination: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Directions of length one, float64 (N, 3), of angles in degrees."""
-    azimuth, inclination = np.radians(azimuth), np.radians(inclination)
-    across = np.cos(inclination)
-    x, y = across * np.cos(azimuth), across * np.sin(azimuth)
-    return np.stack([x, y, np.sin(inclination)], axis=1)
-
-
 @st.composite
 def points_at_borders(draw: st.DrawFn) -> tuple[SphericalGrid, NDArray[np.float32]]:
     """Points on borders between rows, or columns, or so near that few floats lie between."""
@@ -54,7 +48,7 @@ def points_at_borders(draw: st.DrawFn) -> tuple[SphericalGrid, NDArray[np.float3
     inclination = rng.choice([*grid.edges, np.mean(grid.edges)], 50)
     distance = 10 ** rng.uniform(*draw(st.sampled_from([(0, 2), (-3, 6), (-44, 38)])), 50)
     steps = draw(st.sampled_from([0, 1, 1000]))  # of the last place
-    xyz = (towards(azimuth, inclination) * distance[:, None]).astype(np.float32)
+    xyz = (unit_vectors(azimuth, inclination) * distance[:, None]).astype(np.float32)
     xyz += rng.integers(-steps, steps + 1, xyz.shape) * np.spacing(xyz)
     xyz[rng.random(xyz.shape) < 0.1] *= -0.0
     return grid, xyz
@@ -83,7 +77,7 @@ def test_rounding_carries_no_point_across_a_border_that_hardly_lies_in_its_bin()
     heights = np.arange(6000, 4000, -100) + np.linspace(1e-4, 2e-3, 20)
     edges = np.degrees(np.arcsin(heights / (BINS // 2) - 1))
     grid, rng = SphericalGrid(1, (-30, 30), tuple(edges.tolist())), np.random.default_rng(0)
-    xyz = towards(rng.uniform(-29, 29, 50_000), rng.choice(edges, 50_000))
+    xyz = unit_vectors(rng.uniform(-29, 29, 50_000), rng.choice(edges, 50_000))
     xyz = (xyz * rng.uniform(1, 100, (50_000, 1))).astype(np.float32)
     x, y, z = xyz.T
     carried = height_of(z, np.sqrt(x * x + y * y + z * z)) % 1 > 0.5

@@ -13,6 +13,8 @@ from derain.scan import Scan
 from derain.views.grid_fit import PIXELS_PER_RETURN, fit_grid
 from derain.views.spherical_grid import WADS_BEAMS, grid_of
 
+from ..unit_vectors import unit_vectors
+
 HARD_CASES = dict(hard_cases())
 BEAMS = np.array([9.0, 5.0, 3.2, 2.0, 1.1, 0.4, -0.3, -1.0, -2.1, -4.0, -7.5, -13.0])
 
@@ -36,9 +38,8 @@ def sensed(
 
 
 def towards(directions: object, distance: object = 10.0) -> Scan:
-    azimuth, inclination = np.radians(np.asarray(directions, np.float64)).T
-    x, y = np.cos(inclination) * np.cos(azimuth), np.cos(inclination) * np.sin(azimuth)
-    xyz = np.stack([x, y, np.sin(inclination)], axis=-1)
+    azimuth, inclination = np.asarray(directions).T
+    xyz = unit_vectors(azimuth, inclination)
     return Scan((xyz * np.reshape(distance, (-1, 1))).astype(np.float32))
 
 

@@ -25,6 +25,8 @@ from derain.views.isolated_points import (
 )
 from derain.views.neighbour_search import NeighbourSearch
 
+from ..unit_vectors import unit_vectors
+
 VIEW = IsolatedPointView(threads=1)
 
 
@@ -167,12 +169,8 @@ def test_crowding_is_what_is_near_along_the_curve_and_near_the_least_crowded_the
 
 @pytest.mark.parametrize("degrees", [0.1, 0.4, 2.0])
 def test_the_step_is_that_of_the_beams(degrees) -> None:
-    azimuth, inclination = np.meshgrid(*2 * [np.radians(np.arange(-20, 20) * degrees)])
-    level = np.cos(inclination)
-    ball = 15 * np.stack(
-        [level * np.cos(azimuth), level * np.sin(azimuth), np.sin(inclination)], axis=-1
-    )
-    xyz = ball.reshape(-1, 3).astype(np.float32)
+    angle = np.arange(-20, 20) * degrees
+    xyz = (15 * unit_vectors(angle, angle[:, None])).reshape(-1, 3).astype(np.float32)
     neighbours, _ = NeighbourSearch(xyz)(4)
     step = beam_step(xyz, np.arange(len(xyz)), neighbours)
     assert step == pytest.approx(np.radians(degrees), rel=0.1)

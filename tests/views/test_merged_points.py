@@ -9,14 +9,10 @@ from numpy.typing import NDArray
 from derain.views.merged_points import RANGE_RESOLUTION, SAME_RAY, are_one_return, merged_points
 from derain.views.neighbour_search import NeighbourSearch
 
+from ..unit_vectors import unit_vectors
 
-def rays(azimuths: int = 60, inclinations: int = 8) -> NDArray[np.float64]:
-    """Directions of a coarse sensor's rays, float64 (M, 3)."""
-    azimuth = np.linspace(0, 2 * np.pi, azimuths, endpoint=False)
-    azimuth, inclination = np.meshgrid(azimuth, np.radians(np.linspace(-20, 5, inclinations)))
-    level = np.cos(inclination)
-    directions = [level * np.cos(azimuth), level * np.sin(azimuth), np.sin(inclination)]
-    return np.stack(directions, axis=-1).reshape(-1, 3)
+# Directions of a coarse sensor's rays, float64 (M, 3).
+RAYS = unit_vectors(np.arange(0, 360, 6), np.linspace(-20, 5, 8)[:, None]).reshape(-1, 3)
 
 
 def merged(xyz: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -27,8 +23,8 @@ def merged(xyz: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int6
 
 @given(st.floats(1, 100), st.floats(1e-6, 0.9 * RANGE_RESOLUTION), st.integers(0, 2**32 - 1))
 def test_copies_along_the_ray_are_one_with_what_they_copy(range_, behind, seed) -> None:
-    points = range_ * rays()
-    copies = (range_ + behind) * rays()
+    points = range_ * RAYS
+    copies = (range_ + behind) * RAYS
     order = np.random.default_rng(seed).permutation(2 * len(points))
     kept, point = merged(np.concatenate([points, copies])[order])
     assert len(kept) == len(points)
@@ -40,8 +36,8 @@ def test_copies_along_the_ray_are_one_with_what_they_copy(range_, behind, seed) 
 
 @pytest.mark.parametrize("apart", [1.2 * RANGE_RESOLUTION, 0.5])
 def test_a_second_return_farther_behind_stays(apart) -> None:
-    kept, point = merged(np.concatenate([10 * rays(), (10 + apart) * rays()]))
-    assert len(kept) == len(point) == 2 * len(rays())
+    kept, point = merged(np.concatenate([10 * RAYS, (10 + apart) * RAYS]))
+    assert len(kept) == len(point) == 2 * len(RAYS)
 
 
 def test_neighbouring_rays_stay_apart() -> None:
@@ -51,8 +47,8 @@ def test_neighbouring_rays_stay_apart() -> None:
 
 
 def test_of_some_points_it_is_found_which_neighbours_are_one_return_with_them() -> None:
-    xyz = np.concatenate([10 * rays(), 10.01 * rays()]).astype(np.float32)
+    xyz = np.concatenate([10 * RAYS, 10.01 * RAYS]).astype(np.float32)
     some = np.array([3, 17])
     neighbours, distances = NeighbourSearch(xyz)(4, some)
     one = are_one_return(xyz, some, neighbours, distances)
-    np.testing.assert_array_equal(one, neighbours[:, 1:] == some[:, None] + len(rays()))
+    np.testing.assert_array_equal(one, neighbours[:, 1:] == some[:, None] + len(RAYS))

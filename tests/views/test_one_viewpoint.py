@@ -19,6 +19,8 @@ from derain.views.one_viewpoint import (
     viewpoint_issues,
 )
 
+from ..unit_vectors import unit_vectors
+
 # Where the sensor is above the road, metres.
 HEIGHT = 1.8
 
@@ -27,10 +29,9 @@ Points = NDArray[np.float64]
 
 def rays(beams: int, steps: int, sector: float = 360.0, opening: float = 30.0) -> Points:
     """Directions of a sensor that looks ahead, 5 degrees down in the middle, (beams · steps, 3)."""
-    inclination = np.radians(np.linspace(-opening / 2, opening / 2, beams) - 5)[:, None]
-    azimuth = np.radians(np.linspace(-sector / 2, sector / 2, steps, endpoint=sector < 360))
-    x, y = np.cos(inclination) * np.cos(azimuth), np.cos(inclination) * np.sin(azimuth)
-    return np.stack([x, y, np.broadcast_to(np.sin(inclination), x.shape)], axis=-1).reshape(-1, 3)
+    inclination = np.linspace(-opening / 2, opening / 2, beams) - 5
+    azimuth = np.linspace(-sector / 2, sector / 2, steps, endpoint=sector < 360)
+    return unit_vectors(azimuth, inclination[:, None]).reshape(-1, 3)
 
 
 def street(directions: Points, x: float = 0.0) -> Points:
@@ -74,11 +75,6 @@ def spinning() -> Points:
     return street_from(0.0)
 
 
-def moved(points: Points, x: float, y: float = 0.0, z: float = 0.0) -> Points:
-    """Points in a frame whose origin lies elsewhere."""
-    return points + np.array([x, y, z])
-
-
 @cache
 def street_from(x: float) -> Points:
     """What the sensor sees from a place of its drive."""
@@ -88,13 +84,16 @@ def street_from(x: float) -> Points:
 def drive(scans: int, step: float) -> Points:
     """Scans of a sensor that drives along the street, merged in the frame of the last."""
     places = step * np.arange(scans)
-    seen = [moved(street_from(place), place - places[-1]) for place in places]
+    seen = [street_from(place) + np.array([place - places[-1], 0, 0]) for place in places]
     return np.concatenate(seen)
 
 
 @pytest.mark.parametrize(
     "directions",
-    [rays(64, 1024), rays(16, 1800), rays(256, 500, 120, 25), rays(32, 2048, opening=90)],
+    [
+        *(rays(64, 1024), rays(16, 1800), rays(256, 500, 120, 25), rays(32, 2048, opening=90)),
+        rays(4, 1000, opening=3.2),
+    ],
 )
 def test_what_one_sensor_sees_is_not_odd(directions) -> None:
     assert kinds(street(directions)) == []
@@ -142,7 +141,7 @@ def test_a_sensor_on_a_robot_or_a_lorry_and_one_that_sees_no_ground_are_not_odd(
     "origin", [(400_000, 500_000, 200), (400_000, 5_400_000, 200), (700, 100, 0), (0, 0, 300)]
 )
 def test_points_far_from_the_origin_are_those_of_a_map(spinning, origin) -> None:
-    assert kinds(moved(spinning, *origin)) == ["coordinates of a map"]
+    assert kinds(spinning + origin) == ["coordinates of a map"]
 
 
 def test_a_few_points_beyond_all_sensors_are_damage_and_no_map(spinning) -> None:
@@ -167,10 +166,6 @@ FLAT = rays(1, 1000) * (1, 1, 0)
 )
 def test_a_single_beam_is_one_plane_or_cone(directions) -> None:
     assert kinds(street(directions)) == ["a single beam"]
-
-
-def test_four_beams_are_no_single_one() -> None:
-    assert kinds(street(rays(4, 1000, opening=3.2))) == []
 
 
 @pytest.mark.parametrize(("scans", "step"), [(10, 1.3), (5, 10.0)])
@@ -250,18 +245,16 @@ def test_few_points_are_almost_none(spinning, points) -> None:
     assert kinds(np.concatenate([spinning[::1000], np.zeros((7000, 3))])) == ["almost empty"]
 
 
-@pytest.mark.parametrize(
-    "points", [np.zeros((0, 3)), np.zeros((500, 3)), np.full((500, 3), np.nan)]
-)
-def test_a_scan_without_a_point_is_not_odd(points) -> None:
-    assert kinds(points) == []
+def test_a_scan_without_a_point_is_not_odd() -> None:
+    for points in (np.zeros((0, 3)), np.zeros((500, 3)), np.full((500, 3), np.nan)):
+        assert kinds(points) == []
 
 
 def test_every_warning_names_a_remedy(spinning) -> None:
     remedies = {
         "divide millimetres": spinning * 1000,
         "neither in kilometres": spinning / 1000,
-        "subtract the sensor's position": moved(spinning, 4e5, 5e5),
+        "subtract the sensor's position": spinning + 4e5,
         "multiply feet": spinning * 3.28,
         "clean scans one by one": drive(10, 2.0),
         "made for sensors of many beams": street(rays(1, 1000)),
@@ -272,15 +265,12 @@ def test_every_warning_names_a_remedy(spinning) -> None:
         assert remedy in issue.detail
 
 
-@pytest.mark.parametrize("method", ["network", "filter"])
-def test_networks_and_filters_warn_of_it(spinning, method) -> None:
+def test_networks_and_filters_warn_of_it(spinning) -> None:
     scan = Scan.of(np.column_stack([spinning * 1000, np.resize(np.arange(90.0), len(spinning))]))
-    if method == "network":
-        found = OutDet().spec_for(load_card("wads")).issues(scan)
-    else:
-        derainer = FilterDerainer(DROR(), threads=1)
-        found = derainer.issues(derainer.judge(scan))
-    assert [issue.kind for issue in found] == ["points farther off than sensors see"]
+    derainer = FilterDerainer(DROR(), threads=1)
+    spec = OutDet().spec_for(load_card("wads"))
+    for found in (spec.issues(scan), derainer.issues(derainer.judge(scan))):
+        assert [issue.kind for issue in found] == ["points farther off than sensors see"]
 
 
 @pytest.fixture(scope="module")

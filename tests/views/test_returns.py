@@ -14,6 +14,7 @@ from derain.views.return_columns import LEAST_APART
 from derain.views.returns import RayReturns, pair_returns
 
 from ..two_returns import Recording
+from ..unit_vectors import unit_vectors
 
 HARD_CASES = dict(hard_cases(largest=3000))
 CLEAN = ["kitti_hdl64.bin", "kitti_front.bin", "pandaset_pandar64.pcd", "ouster_os1_128.npz"]
@@ -129,10 +130,7 @@ def test_a_radars_detections_are_of_no_ray() -> None:
 @pytest.mark.parametrize("step", [0.011, 0.03, 0.049, 0.2])
 def test_directions_that_agree_by_chance_are_of_no_pair(step) -> None:
     generator = np.random.default_rng(3)
-    width = 120 * step
-    azimuth, inclination = np.radians(generator.uniform(0, width, (2, 15_000)))
-    flat = np.cos(inclination)
-    unit = np.stack([np.cos(azimuth) * flat, np.sin(azimuth) * flat, np.sin(inclination)], axis=1)
+    unit = unit_vectors(*generator.uniform(0, 120 * step, (2, 15_000)))
     xyz = unit * generator.uniform(3, 80, (15_000, 1))
     assert not pair_returns(Scan.of(xyz)).dual
 

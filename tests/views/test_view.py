@@ -7,7 +7,6 @@ from typing import Any, Self
 import numpy as np
 import pytest
 
-from derain.cards.card import load_card
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.files.documents import Entry
@@ -19,6 +18,8 @@ from derain.views.range_image import RangeView
 from derain.views.spherical_grid import ALL_AROUND, grid_of
 from derain.views.view import VIEWS, View
 from derain.views.window import PlacedScan, Window, WindowOfScans
+
+from ..test_spec import SPEC
 
 OURS = {
     "isolated_points": IsolatedPointView(5),
@@ -109,19 +110,8 @@ class ChangeView(View):
 
 
 def spec_seen_through(view: Mapping[str, Any]) -> Spec:
-    card = load_card("wads")
-    return Spec(
-        network="toy",
-        view=view,
-        mean=(0.0,),
-        std=(1.0,),
-        classes=card.classes,
-        rain=card.rain,
-        data=card.name,
-        licence=card.licence,
-        channels=("change",),
-        units=("m",),
-    )
+    one = {"channels": ("change",), "units": ("m",), "mean": (0.0,), "std": (1.0,)}
+    return replace(SPEC, view=view, **one)
 
 
 def test_a_view_of_another_package_sees_a_window_and_stands_in_a_spec(registered) -> None:
