@@ -1,6 +1,5 @@
 """``derain view RECORDING --rerun``: what the viewer is given is what ``derain run`` finds."""
 
-import resource
 from pathlib import Path
 
 import numpy as np
@@ -203,16 +202,12 @@ def test_a_file_that_is_there_stays_until_the_new_one_is_whole(
 
 
 def test_a_full_disk_ends_the_work_with_a_message_and_leaves_nothing(
-    run_derain, recording, tmp_path
+    run_derain, recording, tmp_path, full_disk
 ) -> None:
     """Rerun's library by itself waits for ever where its file may not grow."""
     out = tmp_path / "out.rrd"
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
-    try:
-        outcome = run_derain("view", recording, "--methods", "dror", "--rerun", out)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    full_disk()
+    outcome = run_derain("view", recording, "--methods", "dror", "--rerun", out)
     assert outcome.code == 2
     assert f"{out}: cannot be written (File too large)" in outcome.err
     assert [file.name for file in tmp_path.iterdir()] == ["drive"]

@@ -1,31 +1,19 @@
 """Where a training run writes: one line where it cannot, and nothing lost."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-resource = pytest.importorskip("resource", reason="the system has no limits on files")
-
 SHORT = ("--trainer.max_epochs", "1")
 
 
-@pytest.fixture
-def full_disk() -> Iterator[None]:
-    """No file may grow beyond 50,000 bytes: what a log needs, and no checkpoint."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, hard))
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-
-
 def test_a_full_disk_is_one_line_and_leaves_the_earlier_checkpoint(
-    last_line, wads, checkpoint, request
+    last_line, wads, checkpoint, full_disk
 ) -> None:
     earlier = Path("saved/best.ckpt")
     earlier.parent.mkdir()
     earlier.write_bytes(checkpoint.read_bytes())
-    request.getfixturevalue("full_disk")
+    full_disk()
     line = last_line("fit", *wads, *SHORT, "--checkpoint.dirpath", "saved")
     assert "saved/best.ckpt: cannot be written (File too large). Choose a folder" in line
     assert earlier.read_bytes() == checkpoint.read_bytes()
