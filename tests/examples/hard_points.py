@@ -1,9 +1,14 @@
 """Scans on which a program that reads models differs from derain, if it does anything otherwise."""
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 
 from derain.evaluation.hard_cases import scene
+
+# 3D-OutDet, as an early derain exported it.
+KEPT = Path(__file__).parents[1] / "export" / "kept" / "outdet.onnx"
 
 
 def hard_points() -> NDArray[np.float32]:
@@ -57,3 +62,6 @@ def hard_scans() -> dict[str, NDArray[np.float32]]:
         "nothing valid": np.full((20, 4), np.nan, np.float32),
         "empty": np.zeros((0, 4), np.float32),
     }
+
+
+SCANS = hard_scans()

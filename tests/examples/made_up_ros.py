@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "ros2_node"
-KEPT = Path(__file__).parents[1] / "export" / "kept" / "outdet.onnx"
 
 # x, y, z, 4 bytes of nothing, intensity, ring, and a byte more.
 POINT = np.dtype(

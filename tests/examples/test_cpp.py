@@ -20,10 +20,8 @@ from derain.views.neighbours import Neighbourhoods
 from derain.views.range_image import RangeImage
 from derain.views.view import ViewedScan
 
-from .hard_points import hard_scans
+from .hard_points import KEPT, SCANS
 
-KEPT = Path(__file__).parents[1] / "export" / "kept" / "outdet.onnx"
-SCANS = hard_scans()
 CANDIDATES = Candidates(
     (Bound("range", least=2.0, most=9.0), Bound("intensity", most=99.0), Bound("z", least=-1.5))
 )
@@ -49,8 +47,8 @@ def specs() -> dict[str, Spec]:
 
     def image(right: float, left: float) -> Spec:
         grid = {"columns": 61, "azimuth": [right, left], "edges": edges}
-        view = {"kind": "range", "grid": grid, "way_back": "copy"}
-        return replace(wide(outdet, "intensity", "range", "doppler"), view=view)
+        channels = wide(outdet, "intensity", "range", "doppler")
+        return replace(channels, view={**IMAGE, "grid": grid})
 
     return {
         "circle": image(-180.0, 180.0),

@@ -14,10 +14,7 @@ from derain.export.onnx_file import with_metadata
 from derain.export.runtime import Derainer
 
 from .cpp import Program
-from .hard_points import hard_scans
-
-KEPT = Path(__file__).parents[1] / "export" / "kept" / "outdet.onnx"
-SCANS = hard_scans()
+from .hard_points import KEPT, SCANS
 
 
 def judged_alike(

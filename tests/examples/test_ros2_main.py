@@ -9,7 +9,10 @@ import pytest
 from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
 
-from .made_up_ros import EXAMPLE, KEPT, ExternalShutdownError, Node, Ros, message_of
+from .hard_points import KEPT
+from .made_up_ros import EXAMPLE, ExternalShutdownError, Node, Ros, message_of
+
+pytestmark = pytest.mark.usefixtures("ros")
 
 
 def run_main(ros2_node: ModuleType, patch: pytest.MonkeyPatch, ros: Ros) -> int:
@@ -22,7 +25,6 @@ def run_main(ros2_node: ModuleType, patch: pytest.MonkeyPatch, ros: Ros) -> int:
     return ros2_node.main()
 
 
-@pytest.mark.usefixtures("ros")
 @pytest.mark.parametrize("ending", [None, KeyboardInterrupt(), ExternalShutdownError()])
 def test_it_runs_from_the_first_cloud_until_it_is_stopped(ros2_node, monkeypatch, ending) -> None:
     monkeypatch.setattr(ros2_node, "MOST_RAIN", 1.0)  # of so few points much is called rain
@@ -36,7 +38,6 @@ def test_it_runs_from_the_first_cloud_until_it_is_stopped(ros2_node, monkeypatch
     assert (ros.node.destroyed, ros.running, ros.node.logger) == (True, False, [])
 
 
-@pytest.mark.usefixtures("ros")
 @pytest.mark.parametrize(
     ("parameters", "reason"),
     [
@@ -56,7 +57,6 @@ def test_what_it_cannot_run_with_is_logged_once_and_ends_it(
     assert (ros.node.destroyed, ros.running) == (True, False)
 
 
-@pytest.mark.usefixtures("ros")
 def test_a_fault_ends_it_unless_it_is_being_stopped(ros2_node, monkeypatch) -> None:
     fault = RuntimeError("publisher's context is invalid")
     ros = Ros(Node(threads=1), [], fault)

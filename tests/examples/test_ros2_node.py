@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
 
+from .hard_points import KEPT
 from .made_up_ros import (
-    KEPT,
     POINT,
     DiagnosticArray,
     DiagnosticStatus,
@@ -22,6 +22,8 @@ from .made_up_ros import (
     PointCloud2,
     message_of,
 )
+
+pytestmark = pytest.mark.usefixtures("ros")
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3])
@@ -62,7 +64,6 @@ def test_what_is_odd_is_logged_once(ros2_node) -> None:
     assert news[1] == []
 
 
-@pytest.mark.usefixtures("ros")
 def test_a_cloud_comes_in_and_goes_out_clean(ros2_node, monkeypatch) -> None:
     monkeypatch.setattr(ros2_node, "MOST_RAIN", 1.0)  # of so few points much is called rain
     points = scene(600)
@@ -80,7 +81,6 @@ def test_a_cloud_comes_in_and_goes_out_clean(ros2_node, monkeypatch) -> None:
         assert (kind, published, quality.reliability) == (PointCloud2, [one], "reliable")
 
 
-@pytest.mark.usefixtures("ros")
 @pytest.mark.parametrize(("share", "stay"), [(0.35, 130), (0.36, 200)])
 def test_a_cloud_that_would_lose_too_much_goes_out_whole(
     ros2_node, monkeypatch, share, stay
@@ -111,7 +111,6 @@ def level_after(ros2_node: ModuleType, points: NDArray[np.float32], dry: str = "
     return {b"\0": "OK", b"\1": "WARN", b"\2": "ERROR"}[published.status[0].level]
 
 
-@pytest.mark.usefixtures("ros")
 def test_its_level_is_that_of_the_weather(ros2_node, monkeypatch, tmp_path) -> None:
     points = scene(2000)
     points[:400, :3] *= 3 / np.linalg.norm(points[:400, :3], axis=1, keepdims=True)
@@ -127,7 +126,6 @@ def test_its_level_is_that_of_the_weather(ros2_node, monkeypatch, tmp_path) -> N
         assert level_after(ros2_node, points[:400], dry) == level  # up to 24 m
 
 
-@pytest.mark.usefixtures("ros")
 def test_by_default_it_runs_the_packaged_model_and_publishes_no_rain(ros2_node) -> None:
     node = Node()
     made = ros2_node.DerainNode(node)
@@ -136,7 +134,6 @@ def test_by_default_it_runs_the_packaged_model_and_publishes_no_rain(ros2_node) 
     assert set(node.subscriptions) == {"points"}
 
 
-@pytest.mark.usefixtures("ros")
 def test_a_cloud_that_cannot_be_read_is_logged_and_the_next_one_is_cleaned(ros2_node) -> None:
     node = Node(model=str(KEPT), threads=1)
     ros2_node.DerainNode(node)
@@ -155,7 +152,6 @@ def test_a_cloud_that_cannot_be_read_is_logged_and_the_next_one_is_cleaned(ros2_
     assert node.publishers["points/clean"][1][1:] == [empty]
 
 
-@pytest.mark.usefixtures("ros")
 def test_once_a_second_it_publishes_the_share_of_rain(ros2_node) -> None:
     points = scene(600)
     node = Node(model=str(KEPT), threads=1)

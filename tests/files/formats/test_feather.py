@@ -10,8 +10,6 @@ from pyarrow import feather
 from derain.errors import InputError
 from derain.files import read_scan, write_scan
 
-COMPRESSIONS = ("uncompressed", "lz4", "zstd")
-
 
 @pytest.fixture
 def table() -> pyarrow.Table:
@@ -32,7 +30,7 @@ def table() -> pyarrow.Table:
     return pyarrow.table({**columns, **further}).replace_schema_metadata({"sensor": "up_lidar"})
 
 
-@pytest.mark.parametrize("compression", COMPRESSIONS)
+@pytest.mark.parametrize("compression", ["uncompressed", "lz4", "zstd"])
 def test_a_file_comes_back_byte_for_byte_and_cleaned_without_the_other_rows(
     tmp_path, table, compression
 ) -> None:
