@@ -35,13 +35,6 @@ def test_an_unknown_configuration_is_one_line_with_the_known_ones(refused) -> No
     assert all(name in line for name in packaged_configs())
 
 
-@pytest.fixture
-def bad_checkpoints(checkpoint) -> None:
-    torch.save(torch.load(checkpoint, weights_only=True)["state_dict"], "weights.ckpt")
-    Path("cut.ckpt").write_bytes(checkpoint.read_bytes()[:1000])
-
-
-@pytest.mark.usefixtures("bad_checkpoints")
 @pytest.mark.parametrize(
     ("command", "path", "reason"),
     [
@@ -51,7 +44,11 @@ def bad_checkpoints(checkpoint) -> None:
         ("test", "weights.ckpt", "not a checkpoint of derain"),
     ],
 )
-def test_a_checkpoint_that_cannot_be_used_is_one_line(refused, wads, command, path, reason) -> None:
+def test_a_checkpoint_that_cannot_be_used_is_one_line(
+    refused, wads, checkpoint, command, path, reason
+) -> None:
+    torch.save(torch.load(checkpoint, weights_only=True)["state_dict"], "weights.ckpt")
+    Path("cut.ckpt").write_bytes(checkpoint.read_bytes()[:1000])
     line = refused(command, *wads, "--ckpt_path", path)
     assert line.startswith(f"derain: {path}: ")
     assert reason in line
