@@ -40,6 +40,9 @@ def iou_of(called: np.ndarray) -> float:
 def test_run_takes_what_tune_wrote(run_derain, succeed) -> None:
     outcome = succeed("tune", "dsor", *DATA, "--trials", "5", "--out", BEST)
     assert outcome.out.startswith("dsor: IoU 0.")
+    default = FilterDerainer(filter_from("dsor", {}))
+    iou = iou_of(np.concatenate([default(read_scan(path)) for path in files()]))
+    assert f"{iou:.4f} with the defaults" in outcome.out
     command = BEST.read_text().splitlines()[0].partition(": derain ")[2]
     assert "tune dsor --data velodyne --part validation --card wads" in command
     again = run_derain(*shlex.split(command), "--out", "again.yaml")
