@@ -10,7 +10,7 @@ from derain.errors import InputError
 from derain.simulation.campaign import Campaign, Drive
 from derain.simulation.classes import TrackClass, unpacked
 from derain.simulation.scene import SimulatedScene
-from derain.simulation.sensor import Returns, Sensor
+from derain.simulation.sensor import Sensor
 from derain.simulation.street import SIGHT, STEP, Street, lay_out_street
 from derain.simulation.track import Track
 from derain.simulation.traffic import DRIVING, WALKING, Course, MovingThing, draw_traffic
@@ -122,11 +122,6 @@ def scene(campaign: Campaign) -> SimulatedScene:
     return SimulatedScene.of(campaign, "001", np.random.default_rng(0))
 
 
-def points(returns: Returns, pose: np.ndarray) -> np.ndarray:
-    """Where the beams end in the scene, float64 (N, 3)."""
-    return (SENSOR.beams() * returns.range[:, None]) @ pose[:3, :3].T + pose[:3, 3]
-
-
 def test_what_moves_is_seen_as_if_it_were_built_into_the_street_with_its_number_on_it() -> None:
     drive = scene(Campaign(scans=3, sensor=SENSOR, drive=Drive(speed=13, traffic=7)))
     numbers = set()
@@ -142,7 +137,7 @@ def test_what_moves_is_seen_as_if_it_were_built_into_the_street_with_its_number_
         assert np.array_equal(kind, expected.label)
         assert np.array_equal(returns.beam, expected.beam)
         numbers |= set(number)
-        ends = points(returns, pose)
+        ends = SENSOR.beams() * returns.range[:, None] @ pose[:3, :3].T + pose[:3, 3]
         for row, thing in enumerate(drive.traffic, 1):
             corners = moved(thing, time).reshape(-1, 3)
             inside = ((ends > corners.min(0) - 2e-3) & (ends < corners.max(0) + 2e-3)).all(1)

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from derain.scan import Scan
 from derain.simulation import shapes
@@ -63,10 +62,6 @@ def frames(track: Track, radar: Radar, count: int, rain: RainField = DRY) -> lis
 
 def labels(scans: list[Scan]) -> Ints:
     return np.concatenate([scan.label for scan in scans if scan.label is not None])
-
-
-def column(scans: list[Scan], name: str) -> NDArray[np.float32]:
-    return np.concatenate([scan.fields[name] for scan in scans])
 
 
 def test_the_echo_of_a_plate_is_in_proportion_to_its_area_at_any_distance() -> None:
@@ -146,7 +141,8 @@ def test_positions_are_off_by_a_share_of_the_cell() -> None:
 def test_the_scene_stands_and_the_rain_falls() -> None:
     scans = frames(lay_out_track(np.random.default_rng(0)), Radar(), 3)
     scans += frames(OPEN, replace(Radar(), false_alarm_rate=3e-3), 5, HEAVY)
-    doppler, label = column(scans, "doppler"), labels(scans)
+    doppler = np.concatenate([scan.fields["doppler"] for scan in scans])
+    label = labels(scans)
     still = doppler[label != TrackClass.RAIN]
     assert abs(still.mean()) < 0.02
     assert still.std() == pytest.approx(Radar().doppler_noise, rel=0.1)

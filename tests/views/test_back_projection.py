@@ -79,30 +79,22 @@ def vote_by_hand(points: ProjectedPoints, score: NDArray[np.float32]) -> list[fl
     return result
 
 
-def copy_by_hand(points: ProjectedPoints, score: NDArray[np.float32]) -> list[float]:
-    return [score[pixel] for pixel in points.pixel]
-
-
 @pytest.mark.parametrize(
     ("back_projection", "by_hand"),
-    [(nearest_range, nearest_range_by_hand), (vote, vote_by_hand), (copy, copy_by_hand)],
+    [
+        (nearest_range, nearest_range_by_hand),
+        (vote, vote_by_hand),
+        (copy, lambda points, score: score[points.pixel]),
+    ],
 )
-@given(projection=projections())
-def test_a_way_back_equals_plain_loops(back_projection, by_hand, projection) -> None:
-    np.testing.assert_allclose(back_projection(*projection), by_hand(*projection), rtol=1e-6)
-
-
-@pytest.mark.parametrize("back_projection", [nearest_range, vote])
-def test_answers_do_not_depend_on_how_many_points_look_around_at_a_time(
-    back_projection, monkeypatch
+@given(projection=projections(), chunk=st.sampled_from([7, CHUNK]))
+def test_a_way_back_equals_plain_loops_however_many_points_look_around_at_a_time(
+    back_projection, by_hand, projection, chunk
 ) -> None:
-    rng = np.random.default_rng(1)
-    points = project(rng.integers(0, 600, 900), rng.uniform(1, 9, 900), (20, 30), True)
-    score = rng.random(600, np.float32)
-    assert CHUNK > 900
-    whole = back_projection(points, score)
-    monkeypatch.setattr("derain.views.back_projection.CHUNK", 7)
-    np.testing.assert_array_equal(back_projection(points, score), whole)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("derain.views.back_projection.CHUNK", chunk)
+        found = back_projection(*projection)
+    np.testing.assert_allclose(found, by_hand(*projection), rtol=1e-6)
 
 
 def test_away_from_the_borders_the_vote_is_the_published_one() -> None:

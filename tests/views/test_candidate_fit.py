@@ -80,15 +80,11 @@ def test_the_bounds_follow_the_unit_of_the_data() -> None:
     assert brightest[0] == pytest.approx(255 * brightest[1], rel=0.02)
 
 
-def test_a_network_blind_to_intensity_has_no_bound_on_it() -> None:
-    fitted = fit_candidates([street(5000, 4)], ("x", "y", "z"))
-    assert {bound.channel for bound in fitted.bounds} == {"range", "z"}
-
-
-def test_a_scan_without_intensity_bounds_none() -> None:
-    scan, rain = street(5000, 5)
-    fitted = fit_candidates([(Scan(scan.xyz), rain)], CHANNELS)
-    assert {bound.channel for bound in fitted.bounds} == {"range", "z"}
+def test_intensity_has_no_bound_where_the_network_or_the_scan_has_none() -> None:
+    scan, rain = street(5000, 4)
+    for seen, channels in ((scan, ("x", "y", "z")), (Scan(scan.xyz), CHANNELS)):
+        fitted = fit_candidates([(seen, rain)], channels)
+        assert {bound.channel for bound in fitted.bounds} == {"range", "z"}
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 1.0])

@@ -54,22 +54,19 @@ def points_at_borders(draw: st.DrawFn) -> tuple[SphericalGrid, NDArray[np.float3
     return grid, xyz
 
 
-@settings(max_examples=300)
-@given(points_at_borders())
-def test_points_on_borders_have_the_pixel_that_trigonometry_gives_them(points) -> None:
-    grid, xyz = points
-    np.testing.assert_array_equal(grid.pixel(xyz), computed(grid, xyz))
-
-
-@given(
-    st.sampled_from(GRIDS),
-    hnp.arrays(
-        np.float32,
-        st.tuples(st.integers(0, 40), st.just(3)),
-        elements=st.floats(allow_nan=False, allow_infinity=False, width=32),
-    ),
+any_finite = hnp.arrays(
+    np.float32,
+    st.tuples(st.integers(0, 40), st.just(3)),
+    elements=st.floats(allow_nan=False, allow_infinity=False, width=32),
 )
-def test_so_have_any_finite_points(grid, xyz) -> None:
+
+
+@settings(max_examples=400)
+@given(st.one_of(points_at_borders(), st.tuples(st.sampled_from(GRIDS), any_finite)))
+def test_points_on_borders_and_elsewhere_have_the_pixel_that_trigonometry_gives_them(
+    points,
+) -> None:
+    grid, xyz = points
     np.testing.assert_array_equal(grid.pixel(xyz), computed(grid, xyz))
 
 

@@ -216,8 +216,6 @@ RADAR = ("x", "y", "z", *(f"column {number}" for number in range(3, 10)))
         ("wads/sample.bin", 64, 1856, 64, None, 0.13, 0.15),
         ("wads/sequences/36/velodyne/042223.bin", 64, 1856, 64, None, 0.09, 0.13),
         ("snowykitti/velodyne/000000.bin", 64, 2048, 0, None, 0.11, 0.34),
-        ("snowykitti/velodyne/000001.bin", 64, 2048, 0, None, 0.11, 0.34),
-        ("snowykitti/velodyne/000002.bin", 64, 2048, 0, None, 0.11, 0.34),
         ("clean/kitti_hdl64.bin", 80, 2048, 0, None, 0.14, 0.35),
         ("clean/kitti_front.bin", 64, 448, 0, (-40.4, 39.5), 0.12, 0.47),
         ("clean/pandaset_pandar64.pcd", 63, 1856, 63, None, 0.02, 0.35),

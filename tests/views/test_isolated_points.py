@@ -52,8 +52,7 @@ def rows_of(seen: IsolatedPoints) -> NDArray[np.int64]:
 
 def test_drops_are_isolated_and_a_wall_is_not() -> None:
     scan = wall_and_drops()
-    isolated = np.zeros(len(scan), bool)
-    isolated[rows_of(VIEW(scan))] = True
+    isolated = np.isin(np.arange(len(scan)), rows_of(VIEW(scan)))
     assert isolated[scan.label == 1].all()
     assert isolated[scan.label == 0].mean() < 0.2
 
@@ -88,16 +87,7 @@ def test_a_scan_whose_returns_are_written_twice_is_seen_as_if_they_were_written_
     np.testing.assert_array_equal(second, first)
 
 
-def test_neighbours_are_the_nearest_of_all_points() -> None:
-    scan = wall_and_drops()
-    seen = VIEW(scan)
-    apart = seen.points[:, None] - seen.points[seen.neighbours[:, 0]][None]
-    squared = np.square(apart.astype(np.float64)).sum(axis=2)
-    expected = np.sqrt(np.sort(squared, axis=0)[: VIEW.neighbours]).T
-    np.testing.assert_allclose(seen.distances, expected, atol=1e-5)
-
-
-def test_of_equally_near_neighbours_the_first_row_comes_first() -> None:
+def test_neighbours_are_the_nearest_of_all_points_and_of_equally_near_ones_the_first_row() -> None:
     lattice = np.stack(np.meshgrid(*3 * [np.arange(10.0)]), axis=-1).reshape(-1, 3) * 3 + 5
     xyz = np.random.default_rng(0).permutation(lattice).astype(np.float32)
     seen = VIEW(Scan(xyz))
@@ -105,6 +95,7 @@ def test_of_equally_near_neighbours_the_first_row_comes_first() -> None:
     squared = np.square(xyz[:, None].astype(np.float64) - xyz).sum(axis=2)
     nearest = np.argsort(squared, axis=1, kind="stable")[:, : VIEW.neighbours]
     np.testing.assert_array_equal(rows, nearest[rows[:, 0]])
+    np.testing.assert_allclose(seen.distances, np.sqrt(squared[rows[:, :1], rows]), rtol=1e-6)
     assert len(rows) > 20
 
 

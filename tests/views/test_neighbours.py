@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from derain.evaluation.hard_cases import scene
 from derain.scan import Scan
 from derain.views.candidates import Bound, Candidates
+from derain.views.channels import filled_values
 from derain.views.morton import distinct_positions, distinct_rows, first_rows, morton_code
 from derain.views.neighbour_search import NeighbourSearch
 from derain.views.neighbours import Neighbourhoods, NeighbourView
@@ -57,15 +58,6 @@ def test_the_answer_does_not_depend_on_the_order_inside(xyz, random) -> None:
     neighbours, _ = NeighbourSearch(xyz)(5)
     shuffled, _ = NeighbourSearch(xyz[shuffle], rank=shuffle)(5)
     np.testing.assert_array_equal(shuffle[shuffled], neighbours[shuffle])
-
-
-@given(st.one_of(gridded, scattered))
-def test_distinct_positions_are_those_of_numpy_unique(xyz) -> None:
-    first, inverse = distinct_positions(xyz)
-    expected, expected_first = np.unique(xyz, axis=0, return_index=True)
-    assert sorted(first) == sorted(expected_first)
-    assert len(first) == len(expected)
-    np.testing.assert_array_equal(xyz[first][inverse], xyz)
 
 
 @given(gridded, st.randoms(use_true_random=False))
@@ -119,37 +111,17 @@ def test_rows_at_one_position_get_one_answer_and_invalid_rows_get_zero() -> None
     assert back[1] == back[4] == 0
 
 
-@pytest.mark.parametrize("count", [0, 1, 2, 8])
-def test_fewer_points_than_neighbours_repeat_the_farthest(count) -> None:
-    xyz = np.c_[np.arange(1, count + 1), np.zeros((count, 2))].astype(np.float32)
-    view = NeighbourView(neighbours=9)(Scan.of(np.c_[xyz, np.ones(count)]))
-    assert view.neighbours.shape == view.distances.shape == (count, 9)
-    if count:
-        assert (np.diff(view.distances, axis=1) >= 0).all()
-        assert (view.distances[:, count - 1 :] == view.distances[:, -1:]).all()
-
-
-def test_points_hold_the_channels_asked_for_in_their_order_and_a_stand_in_for_gaps() -> None:
+def test_points_hold_the_channels_asked_for_which_do_not_change_who_is_near() -> None:
     rng = np.random.default_rng(5)
     xyz = rng.normal(size=(50, 3)).astype(np.float32)
-    rcs = np.where(np.arange(50) < 20, np.nan, rng.normal(size=50))
-    scan = Scan(xyz, fields={"rcs": rcs})
-    channels = ("rcs", "range", "z", "intensity")
-    view = NeighbourView(channels=channels, fill_value={"rcs": 7.5, "intensity": 9.5})(scan)
-    rows = view.first
-    np.testing.assert_array_equal(
-        view.points[:, 0], np.float32(np.where(rows < 20, 7.5, rcs[rows]))
-    )
-    np.testing.assert_array_equal(view.points[:, 1], scan.range[rows])
-    np.testing.assert_array_equal(view.points[:, 2], xyz[rows, 2])
-    np.testing.assert_array_equal(view.points[:, 3], 9.5)
-
-
-def test_channels_do_not_change_who_is_near() -> None:
-    scan = Scan.of(np.random.default_rng(6).normal(size=(500, 4)))
-    usual, other = NeighbourView()(scan), NeighbourView(channels=("intensity",))(scan)
-    np.testing.assert_array_equal(usual.neighbours, other.neighbours)
-    np.testing.assert_array_equal(usual.distances, other.distances)
+    scan = Scan(xyz, fields={"rcs": np.where(np.arange(50) < 20, np.nan, rng.normal(size=50))})
+    channels, fill_value = ("rcs", "range", "z", "intensity"), {"rcs": 7.5, "intensity": 9.5}
+    view = NeighbourView(channels=channels, fill_value=fill_value)(scan)
+    expected = filled_values(scan, view.first, channels, fill_value)
+    np.testing.assert_array_equal(view.points, expected)
+    usual = NeighbourView()(scan)
+    np.testing.assert_array_equal(view.neighbours, usual.neighbours)
+    np.testing.assert_array_equal(view.distances, usual.distances)
 
 
 # In a scene, these hold the drops and some of the road.

@@ -89,21 +89,15 @@ def test_poles_have_the_direction_straight_ahead() -> None:
         assert pixel(FULL, *zeros, 5) is None
 
 
-def test_borders_belong_to_the_pixel_below_and_to_the_right() -> None:
+def test_borders_belong_to_the_pixel_below_and_to_the_right_and_bounds_to_the_grid() -> None:
     grid = SphericalGrid.even(2, 4, (-45, 45), (-90, 90))
     assert pixel(grid, 10, 0, 0) == (1, 2)
     assert pixel(grid, 10, 10, 0) == (1, 1)
     assert pixel(grid, 10, -10, -0.0) == (1, 3)
-
-
-def test_bounds_belong_to_the_grid() -> None:
-    grid = SphericalGrid.even(2, 4, (-45, 45), (-90, 90))
     assert pixel(grid, 0, 10, 10) == (0, 0)
     assert pixel(grid, 0, -10, -10) == (1, 3)
-    assert pixel(grid, 0, 10, 10.001) is None
-    assert pixel(grid, 0, 10, -10.001) is None
-    assert pixel(grid, -1e-3, 10, 0) is None
-    assert pixel(grid, -1e-3, -10, 0) is None
+    for outside in ((0, 10, 10.001), (0, 10, -10.001), (-1e-3, 10, 0), (-1e-3, -10, 0)):
+        assert pixel(grid, *outside) is None
 
 
 def test_every_beam_has_its_own_row() -> None:

@@ -42,6 +42,10 @@ def assert_same(first: Returns, second: Returns) -> None:
         assert (getattr(first, name) == getattr(second, name)).all(), name
 
 
+def met(clear: Returns, weather: Precipitation, seed: int, sensor: Sensor = SENSOR) -> Returns:
+    return meet(clear, sensor.beams(), weather, sensor, np.random.default_rng(seed))
+
+
 def test_a_particle_covers_the_lens_of_both_discs() -> None:
     step = np.linspace(-0.5, 0.5, 1001)
     across, up = np.meshgrid(step, step)
@@ -72,7 +76,7 @@ def test_each_particle_stands_in_the_shadow_of_those_before_it() -> None:
 def test_clear_air_is_the_clear_air_of_rain_without_rain() -> None:
     clear = random_surfaces(len(BEAMS), np.random.default_rng(1))
     dry = rain_on_beams(clear, BEAMS, UniformRain(0), SENSOR, np.random.default_rng(2))
-    assert_same(meet(clear, BEAMS, Precipitation(), SENSOR, np.random.default_rng(3)), dry)
+    assert_same(met(clear, Precipitation(), 3), dry)
 
 
 @pytest.mark.parametrize("spill", [1.0, 2.0])
@@ -84,9 +88,7 @@ def test_both_returns_come_where_any_particle_is_before_a_dim_surface(spill) -> 
     width = optics.width(distance)
     area = np.pi / 4 * (width**2 + 2 * width * sizes.moment(1) + sizes.moment(2))
     share = -math.expm1(-snow.number * np.trapezoid(area, distance))
-    detected = meet(
-        surfaces(len(beams), 10.0, 1e-12), beams, snow, SPARSE, np.random.default_rng(4)
-    )
+    detected = met(surfaces(len(beams), 10.0, 1e-12), snow, 4, SPARSE)
     assert 0.1 < share < 0.9
     error = math.sqrt(share * (1 - share) / len(beams))
     assert (np.bincount(detected.beam) == 2).mean() == pytest.approx(share, abs=4 * error)
@@ -112,34 +114,27 @@ def test_whatever_flies_each_beam_is_kept_weaker_or_ends_nearer_or_is_lost(
     generator = np.random.default_rng(seed)
     sensor, clear = replace(SENSOR, returns=returns), random_surfaces(len(BEAMS), generator)
     weather = KINDS[kind].draw(kind, generator)
-    detected = meet(clear, BEAMS, weather, sensor, np.random.default_rng(seed))
+    detected = met(clear, weather, seed, sensor)
     assert_kept_weaker_or_ends_at_a_particle_or_lost(clear, detected, sensor)
     assert kind != "none" or not (detected.label == TrackClass.RAIN).any()
-    again = meet(clear, BEAMS, weather, sensor, np.random.default_rng(seed))
+    again = met(clear, weather, seed, sensor)
     assert_same(detected, again)
 
 
 def test_surfaces_fade_with_what_is_too_small_to_be_seen() -> None:
     sensor = replace(SENSOR, detection_threshold=1e-5)
     fog = Precipitation(number=20_000.0, diameter=0.25, largest=0.3, reflectivity=1e-5)
-    detected = meet(surfaces(len(BEAMS), 30.0, 0.8), BEAMS, fog, sensor, np.random.default_rng(7))
+    detected = met(surfaces(len(BEAMS), 30.0, 0.8), fog, 7, sensor)
     extinction = 20_000 * math.pi / 2 * Sizes.gamma(0.25, 1, 0.3).moment(2)
     assert (detected.label == TrackClass.CAR).all()
     assert detected.reflectivity == pytest.approx(0.8 * math.exp(-60 * extinction))
 
 
 def test_weak_returns_scatter_more_than_strong_ones() -> None:
-    beams = SPARSE.beams()
     sensor = replace(SPARSE, detection_threshold=1e-7, returns="strongest")
+    clear = surfaces(sensor.columns * sensor.rows, 30.0, 0.0)
     exact, noisy = (
-        meet(
-            surfaces(len(beams), 30.0, 0.0),
-            beams,
-            Precipitation(number=1000.0, jitter=jitter),
-            sensor,
-            np.random.default_rng(8),
-        )
-        for jitter in (0.0, 0.2)
+        met(clear, Precipitation(number=1000.0, jitter=jitter), 8, sensor) for jitter in (0.0, 0.2)
     )
     rain = exact.label == TrackClass.RAIN
     assert (rain == (noisy.label == TrackClass.RAIN)).all()
@@ -160,7 +155,7 @@ def test_no_more_particles_than_the_crowding_meet_an_open_beam(crowding) -> None
 
 
 def rain_places(weather: Precipitation, clear: Returns, seed: int) -> Floats:
-    detected = meet(clear, BEAMS, weather, SENSOR, np.random.default_rng(seed))
+    detected = met(clear, weather, seed)
     rain = detected.label == TrackClass.RAIN
     return BEAMS[detected.beam[rain]] * detected.range[rain, None]
 
