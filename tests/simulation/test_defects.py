@@ -1,7 +1,6 @@
 """What is wrong with scans: losses, copies, steps, and points between two surfaces."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -70,8 +69,7 @@ def test_a_return_that_is_alone_is_copied_and_distances_go_to_the_nearest_step()
     assert rows.tolist() == [0, 0, 1, 2, 3, 3, 4, 5, 6, 6]
     some = Defects(copies=0.3).reported(np.arange(BEAMS), np.random.default_rng(5))
     assert within(len(some) - BEAMS, BEAMS, 0.3)
-    sensor = Sensor(rows=ROWS, columns=COLUMNS, defects=Defects(copies=1.0))
-    sensor = replace(sensor, defects=replace(sensor.defects, range_step=0.02))
+    sensor = Sensor(rows=ROWS, columns=COLUMNS, defects=Defects(copies=1.0, range_step=0.02))
     scan = sensor.measure(posts(), np.random.default_rng(0))
     assert np.abs(scan.range / 0.02 - np.rint(scan.range / 0.02)).max() < 1e-3
     assert len(scan) == 2 * BEAMS

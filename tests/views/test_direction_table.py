@@ -63,9 +63,7 @@ any_finite = hnp.arrays(
 
 @settings(max_examples=400)
 @given(st.one_of(points_at_borders(), st.tuples(st.sampled_from(GRIDS), any_finite)))
-def test_points_on_borders_and_elsewhere_have_the_pixel_that_trigonometry_gives_them(
-    points,
-) -> None:
+def test_points_on_borders_and_elsewhere_have_the_pixel_of_their_angles(points) -> None:
     grid, xyz = points
     np.testing.assert_array_equal(grid.pixel(xyz), computed(grid, xyz))
 

@@ -99,9 +99,7 @@ def test_a_point_comes_first_in_its_own_neighbourhood_even_among_duplicates() ->
 
 
 def test_rows_at_one_position_get_one_answer_and_invalid_rows_get_zero() -> None:
-    points = np.array(
-        [[1, 2, 3, 4], [np.nan, 0, 0, 0], [5, 6, 7, 8], [1, 2, 3, 4], [0, 0, 0, 9]], np.float32
-    )
+    points = [[1, 2, 3, 4], [np.nan, 0, 0, 0], [5, 6, 7, 8], [1, 2, 3, 4], [0, 0, 0, 9]]
     view = NeighbourView()(Scan.of(points))
     score = np.arange(1, 1 + len(view.points), dtype=np.float32)
     back = view.back(score)

@@ -189,9 +189,7 @@ def test_hard_cases_have_finite_images_and_every_judged_row_an_answer(case) -> N
 @pytest.mark.parametrize("back_projection", BACK_PROJECTIONS)
 @pytest.mark.parametrize("grid", [FULL, FRONT], ids=["full circle", "front"])
 @given(points=clouds)
-def test_scores_come_back_by_the_back_projection_that_is_named(
-    grid, back_projection, points
-) -> None:
+def test_scores_come_back_by_the_named_back_projection(grid, back_projection, points) -> None:
     image = RangeView(grid, back_projection=back_projection)(Scan.of(points))
     on = np.flatnonzero(image.judged)
     projected = ProjectedPoints(image.pixel[on], image.range[on], image.nearest, image.wraps)
