@@ -134,6 +134,14 @@ def test_scans_without_rain_are_refused(refused, write_labelled) -> None:
     assert not BEST.exists()
 
 
+def test_tuning_on_real_snow_finds_better_parameters(succeed, shared) -> None:
+    data = ["--data", shared / "data/wads/sample.bin", "--card", "wads"]
+    outcome = succeed("tune", "dsor", *data, "--trials", "20", "--out", BEST)
+    words = outcome.out.splitlines()[0].split()
+    tuned, default = float(words[2]), float(words[8])
+    assert tuned > default
+
+
 def test_what_cannot_be_written_is_refused_before_any_work(refused) -> None:
     out = "velodyne/0.bin/no.yaml"
     line = refused("tune", "dsor", *DATA, "--storage", "study.db", "--out", out)

@@ -174,3 +174,16 @@ def test_packing_keeps_every_scan_to_itself(candidates) -> None:
             np.testing.assert_array_equal(rows, array + shift.get(name, 0))
         begin = {name: begin[name] + len(array) for name, array in inputs.items()}
     assert {name: len(array) for name, array in packed.items()} == begin
+
+
+def test_a_real_scan_agrees_with_scikit_learn(shared) -> None:
+    from sklearn.neighbors import KDTree
+
+    points = np.fromfile(shared / "data/wads/sample.bin", np.float32).reshape(-1, 4)
+    view = NeighbourView()(Scan.of(points))
+    assert sorted(view.first) == list(range(len(points)))
+    some = np.random.default_rng(4).choice(len(points), 3000, replace=False)
+    distances, neighbours = KDTree(points[:, :3]).query(points[some, :3], 9)
+    rows = view.inverse[some]
+    np.testing.assert_allclose(view.distances[rows], distances, atol=1e-5)
+    assert (view.first[view.neighbours[rows]] == neighbours).mean() > 0.9999
