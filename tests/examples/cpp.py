@@ -1,21 +1,14 @@
 """Builds and runs the example in C++."""
 
 import re
-import shutil
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
 SOURCE = Path(__file__).resolve().parents[2] / "examples" / "cpp"
-TOOLS = ("cmake", "c++", "make")
 
 # A program that takes arguments.
 Program = Callable[..., subprocess.CompletedProcess[str]]
-
-
-def missing_tools() -> list[str]:
-    """What there is not, of what builds it."""
-    return [tool for tool in TOOLS if shutil.which(tool) is None]
 
 
 def build(folder: Path) -> None:

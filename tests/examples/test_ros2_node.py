@@ -26,6 +26,13 @@ from .made_up_ros import (
 pytestmark = pytest.mark.usefixtures("ros")
 
 
+def started(ros2_node: ModuleType, **parameters: str) -> Node:
+    """A node on which the example hangs."""
+    node = Node(model=str(KEPT), threads=1, **parameters)
+    ros2_node.DerainNode(node)
+    return node
+
+
 @pytest.mark.parametrize("share", [0.0, 0.3])
 def test_a_cloud_is_parted_into_what_stays_and_what_is_removed(ros2_node, share) -> None:
     message = message_of(scene(200), height=4, gap=9)
@@ -68,8 +75,7 @@ def test_a_cloud_comes_in_and_goes_out_clean(ros2_node, monkeypatch) -> None:
     monkeypatch.setattr(ros2_node, "MOST_RAIN", 1.0)  # of so few points much is called rain
     points = scene(600)
     message = message_of(points)
-    node = Node(input="in", output="out", removed="gone", model=str(KEPT), threads=1)
-    ros2_node.DerainNode(node)
+    node = started(ros2_node, input="in", output="out", removed="gone")
     kind, call, quality = node.subscriptions["in"]
     assert (kind, quality.depth, quality.reliability) == (PointCloud2, 1, "best effort")
     call(message)
@@ -86,8 +92,7 @@ def test_a_cloud_that_would_lose_too_much_goes_out_whole(
     ros2_node, monkeypatch, share, stay
 ) -> None:
     calling_rain(monkeypatch, ros2_node, np.arange(200) < 200 * share)
-    node = Node(model=str(KEPT), threads=1, removed="gone")
-    ros2_node.DerainNode(node)
+    node = started(ros2_node, removed="gone")
     node.subscriptions["points"][1](message_of(scene(200)))
     published = [node.publishers[topic][1][0].width for topic in ("points/clean", "gone")]
     assert published == [stay, 200 - stay]
@@ -103,8 +108,7 @@ def calling_rain(patch: pytest.MonkeyPatch, ros2_node: ModuleType, rain: NDArray
 
 def level_after(ros2_node: ModuleType, points: NDArray[np.float32], dry: str = "") -> str:
     """The level that the node reports after a cloud."""
-    node = Node(model=str(KEPT), threads=1, dry=dry)
-    ros2_node.DerainNode(node)
+    node = started(ros2_node, dry=dry)
     node.subscriptions["points"][1](message_of(points))
     node.timers[0][1]()
     (published,) = node.publishers["/diagnostics"][1]
@@ -135,8 +139,7 @@ def test_by_default_it_runs_the_packaged_model_and_publishes_no_rain(ros2_node) 
 
 
 def test_a_cloud_that_cannot_be_read_is_logged_and_the_next_one_is_cleaned(ros2_node) -> None:
-    node = Node(model=str(KEPT), threads=1)
-    ros2_node.DerainNode(node)
+    node = started(ros2_node)
     _, call, _ = node.subscriptions["points"]
     flat, short = message_of(scene(200)), message_of(scene(200))
     flat.fields = [one for one in flat.fields if one.name != "z"]
@@ -154,8 +157,7 @@ def test_a_cloud_that_cannot_be_read_is_logged_and_the_next_one_is_cleaned(ros2_
 
 def test_once_a_second_it_publishes_the_share_of_rain(ros2_node) -> None:
     points = scene(600)
-    node = Node(model=str(KEPT), threads=1)
-    ros2_node.DerainNode(node)
+    node = started(ros2_node)
     ((period, report),) = node.timers
     node.subscriptions["points"][1](message_of(points))
     report()

@@ -26,16 +26,9 @@ def started(folder: Path) -> list[str]:
         command.parent.mkdir(exist_ok=True)
         command.write_text(f"#!/bin/sh\n{line}\n")
         command.chmod(0o755)
-    path = f"{folder / 'bin'}:{os.environ['PATH']}"
-    finished = subprocess.run(
-        ["bash", SCRIPT, *FIT],
-        cwd=folder,
-        env={**os.environ, **JOB, "PATH": path},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    words = finished.stdout.splitlines()
+    environment = {**os.environ, **JOB, "PATH": f"{folder / 'bin'}:{os.environ['PATH']}"}
+    command = ["bash", SCRIPT, *FIT]
+    words = subprocess.check_output(command, cwd=folder, env=environment, text=True).splitlines()
     return words[words.index("torchrun") + 1 :]
 
 

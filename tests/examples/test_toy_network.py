@@ -19,7 +19,6 @@ from derain.models.registry import NETWORKS
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
-RAIN = 110  # falling snow, in WADS
 DROPS = np.arange(300) >= 270
 
 
@@ -42,7 +41,7 @@ def root(tmp_path_factory) -> Path:
         (folder / "velodyne").mkdir(parents=True)
         (folder / "labels").mkdir()
         scene(300, seed=number).tofile(folder / "velodyne/0.bin")
-        write_labels(folder / "labels/0.label", np.where(DROPS, RAIN, 0))
+        write_labels(folder / "labels/0.label", np.where(DROPS, 110, 0))  # falling snow
     return root
 
 

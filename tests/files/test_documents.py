@@ -1,5 +1,7 @@
 """Small documents are read within bounds, and errors name what is wrong with them."""
 
+from pathlib import Path
+
 import pytest
 
 from derain.errors import LONGEST_REASON, InputError
@@ -23,9 +25,13 @@ BAD_YAML = {
 }
 
 
+@pytest.fixture
+def path(tmp_path) -> Path:
+    return tmp_path / "document.yaml"
+
+
 @pytest.mark.parametrize("name", BAD_YAML)
-def test_bad_yaml_is_one_short_line(name, tmp_path) -> None:
-    path = tmp_path / "document.yaml"
+def test_bad_yaml_is_one_short_line(name, path) -> None:
     path.write_bytes(BAD_YAML[name].encode("latin-1"))
     with pytest.raises(InputError) as caught:
         Entry.of_yaml(path)
@@ -38,15 +44,13 @@ def test_bad_yaml_is_one_short_line(name, tmp_path) -> None:
     ("text", "line", "key"),
     [("b:\n  - c: 1\n    'a': 1\n    a: 1\n", 4, "a"), ("5: x\n0x5: y\n", 2, "5")],
 )
-def test_a_key_that_is_there_twice_is_named_with_its_line(tmp_path, text, line, key) -> None:
-    path = tmp_path / "document.yaml"
+def test_a_key_that_is_there_twice_is_named_with_its_line(path, text, line, key) -> None:
     path.write_text(text)
     with pytest.raises(InputError, match=rf"line {line}: the key '?{key}'? is there twice"):
         Entry.of_yaml(path)
 
 
-def test_a_document_that_is_too_large_is_not_read(tmp_path) -> None:
-    path = tmp_path / "document.yaml"
+def test_a_document_that_is_too_large_is_not_read(path) -> None:
     path.write_text("a: 1\n" + "#" * LARGEST_DOCUMENT)
     with pytest.raises(InputError, match="more than 1,048,576"):
         Entry.of_yaml(path)
@@ -74,8 +78,7 @@ def test_a_number_is_finite_and_no_truth_value(value) -> None:
         entry.scalar()
 
 
-def test_many_small_values_in_a_document_are_too_many(tmp_path) -> None:
-    path = tmp_path / "document"
+def test_many_small_values_in_a_document_are_too_many(path) -> None:
     path.write_text("[" + "[]," * 100_000 + "0]")  # 300 kB, and 10 MB in memory
     for read in (Entry.of_yaml, Entry.of_json_file):
         with pytest.raises(InputError, match="more than 65,536 values"):
@@ -91,8 +94,7 @@ def test_many_small_values_in_a_document_are_too_many(tmp_path) -> None:
         *((text, text.strip("'")) for text in ("'4e-6'", "4e-6 m", "e5", "0e1f")),
     ],
 )
-def test_a_number_with_an_exponent_is_one_with_and_without_a_point(text, value, tmp_path) -> None:
-    path = tmp_path / "document.yaml"
+def test_a_number_with_an_exponent_is_one_with_and_without_a_point(text, value, path) -> None:
     path.write_text(f"a: {text}")
     read = Entry.of_yaml(path).value["a"]
     assert (type(read), read) == (type(value), value)

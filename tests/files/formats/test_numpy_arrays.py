@@ -15,11 +15,12 @@ from derain.files import read_scan, write_scan
 HEIGHT, WIDTH = 4, 6
 
 
-@pytest.fixture
-def organised() -> dict[str, np.ndarray]:
-    """Arrays of a spinning sensor with 4 beams and 6 columns."""
+def test_organised_arrays_are_flattened_row_by_row_and_come_back_as_they_were(
+    tmp_path,
+) -> None:
+    # Of a spinning sensor with 4 beams and 6 columns.
     generator = np.random.default_rng(1)
-    return {
+    organised = {
         "xyz": generator.normal(0, 9, (HEIGHT, WIDTH, 3)).astype(np.float32),
         "signal": generator.integers(0, 9000, (HEIGHT, WIDTH), np.uint16),
         "reflectivity": generator.integers(0, 255, (HEIGHT, WIDTH), np.uint8),
@@ -27,11 +28,6 @@ def organised() -> dict[str, np.ndarray]:
         "beam_angles": np.linspace(-20, 20, HEIGHT),
         "file": np.array("made by hand"),
     }
-
-
-def test_organised_arrays_are_flattened_row_by_row_and_come_back_as_they_were(
-    tmp_path, organised
-) -> None:
     with zipfile.ZipFile(tmp_path / "scan.npz", "w") as archive:
         for name, array in organised.items():
             with archive.open(f"{name}.npy", "w") as file:

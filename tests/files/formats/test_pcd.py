@@ -27,8 +27,7 @@ POINTS 2
 DATA binary
 """
 POINTS = ((1.5, -2.0, 0.25, 7), (math.nan, math.inf, -0.0, 65535))
-ROW = struct.Struct("<fffH")
-DATA = b"".join(ROW.pack(*point) for point in POINTS)
+DATA = b"".join(struct.pack("<fffH", *point) for point in POINTS)
 
 
 @pytest.fixture
