@@ -39,10 +39,10 @@ def test_each_value_is_the_scans_or_else_the_stand_in(column, mean) -> None:
     np.testing.assert_array_equal(filled, np.float32(expected))
 
 
-def test_a_channel_without_a_stand_in_is_zero_where_it_is_missing() -> None:
-    scan = Scan(np.full((2, 3), 4, np.float32))
-    filled = filled_values(scan, np.array([1]), ["rcs", "y"], {"y": 7.0})
-    assert filled.tolist() == [[0, 4]]
+def test_channels_keep_their_order_and_one_without_a_stand_in_is_zero_where_it_is_missing() -> None:
+    scan = Scan(np.arange(6, dtype=np.float32).reshape(2, 3))
+    filled = filled_values(scan, np.array([1]), ["y", "rcs", "x"], {"y": 7.0})
+    assert filled.tolist() == [[4, 0, 3]]
 
 
 @pytest.mark.parametrize("scan", HARD_CASES.values(), ids=HARD_CASES)
