@@ -3,9 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.simulation.sensor import unit_vectors
 from derain.views.return_columns import LEAST_APART
-
-from .unit_vectors import unit_vectors
 
 
 class Recording:

@@ -146,13 +146,12 @@ def combined_log_odds(points: ScanPoints, evidence: RayEvidence | None) -> NDArr
         points: M points of a scan.
         evidence: That of the rays of other scans; None where there is no other scan.
     """
-    by_surroundings: NDArray[np.float64]
-    by_surroundings = surroundings_features(points) @ np.array(SURROUNDINGS_WEIGHTS)
+    log_odds: NDArray[np.float64] = surroundings_features(points) @ np.array(SURROUNDINGS_WEIGHTS)
     if evidence is None:
-        return by_surroundings
+        return log_odds
     any_point, ending, through = RAY_WEIGHTS
     by_rays = any_point + ending * evidence.ending + through * evidence.through
-    return by_surroundings + by_rays - PRIOR
+    return log_odds + by_rays - PRIOR
 
 
 def vote(points: ScanPoints, log_odds: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -24,9 +24,8 @@ from derain.simulation.radar import (
     volume_reflectivity,
 )
 from derain.simulation.rain_field import RainField, SprinkledRain, UniformRain
+from derain.simulation.sensor import unit_vectors
 from derain.simulation.track import Track
-
-from ..unit_vectors import unit_vectors
 
 pytestmark = pytest.mark.usefixtures("open3d")
 
@@ -45,7 +44,7 @@ def plate(x: float, width: float, y: float = 0.0, height: float = 0.6) -> Surfac
 def in_cell(radar: Radar, row: int, column: int, depth: int, width: float) -> Track:
     """A square target in the middle of a cell."""
     inclination, azimuth, distance = radar.centres()
-    direction = unit_vectors(np.degrees(azimuth[column]), np.degrees(inclination[row]))
+    (direction,) = unit_vectors(np.degrees(azimuth[column]), np.degrees(inclination[row]))
     x, y, height = distance[depth] * direction + (0, 0, radar.mounting_height)
     return Track.of([plate(x, width, y, height)])
 

@@ -88,7 +88,7 @@ def vote_by_hand(points: ProjectedPoints, score: NDArray[np.float32]) -> list[fl
     ],
 )
 @given(projection=projections(), chunk=st.sampled_from([7, CHUNK]))
-def test_a_way_back_equals_plain_loops_however_many_points_look_around_at_a_time(
+def test_a_back_projection_equals_plain_loops_in_chunks_of_any_size(
     back_projection, by_hand, projection, chunk
 ) -> None:
     with pytest.MonkeyPatch.context() as patch:

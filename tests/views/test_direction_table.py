@@ -7,11 +7,10 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
+from derain.simulation.sensor import unit_vectors
 from derain.views.direction_table import BINS, BORDER_MARGIN, UNSURE_BELOW, height_of, turn_of
 from derain.views.directions import directions
 from derain.views.spherical_grid import PUBLISHED_GRIDS, SphericalGrid, grid_of
-
-from ..unit_vectors import unit_vectors
 
 PUBLISHED = [grid_of(name, "test") for name in PUBLISHED_GRIDS]
 GRIDS = [

@@ -10,10 +10,9 @@ from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases
 from derain.files import DEFAULT_COLUMNS, read_scan
 from derain.scan import Scan
+from derain.simulation.sensor import unit_vectors
 from derain.views.grid_fit import PIXELS_PER_RETURN, fit_grid
 from derain.views.spherical_grid import WADS_BEAMS, grid_of
-
-from ..unit_vectors import unit_vectors
 
 HARD_CASES = dict(hard_cases())
 BEAMS = np.array([9.0, 5.0, 3.2, 2.0, 1.1, 0.4, -0.3, -1.0, -2.1, -4.0, -7.5, -13.0])

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.scan import Scan
+from derain.simulation.sensor import unit_vectors
 from derain.views.intensity_rank import INTENSITY_RANKS, intensity_rank
 from derain.views.isolated_points import (
     FARTHEST,
@@ -24,8 +25,6 @@ from derain.views.isolated_points import (
     crowding,
 )
 from derain.views.neighbour_search import NeighbourSearch
-
-from ..unit_vectors import unit_vectors
 
 VIEW = IsolatedPointView(threads=1)
 
@@ -161,7 +160,7 @@ def test_crowding_is_what_is_near_along_the_curve_and_near_the_least_crowded_the
 @pytest.mark.parametrize("degrees", [0.1, 0.4, 2.0])
 def test_the_step_is_that_of_the_beams(degrees) -> None:
     angle = np.arange(-20, 20) * degrees
-    xyz = (15 * unit_vectors(angle, angle[:, None])).reshape(-1, 3).astype(np.float32)
+    xyz = (15 * unit_vectors(angle, angle[:, None])).astype(np.float32)
     neighbours, _ = NeighbourSearch(xyz)(4)
     step = beam_step(xyz, np.arange(len(xyz)), neighbours)
     assert step == pytest.approx(np.radians(degrees), rel=0.1)

@@ -6,13 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from derain.simulation.sensor import unit_vectors
 from derain.views.merged_points import RANGE_RESOLUTION, SAME_RAY, are_one_return, merged_points
 from derain.views.neighbour_search import NeighbourSearch
 
-from ..unit_vectors import unit_vectors
-
 # Directions of a coarse sensor's rays, float64 (M, 3).
-RAYS = unit_vectors(np.arange(0, 360, 6), np.linspace(-20, 5, 8)[:, None]).reshape(-1, 3)
+RAYS = unit_vectors(np.arange(0, 360, 6), np.linspace(-20, 5, 8)[:, None])
 
 
 def merged(xyz: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -11,6 +11,7 @@ from derain.files import read_scan
 from derain.filters import DROR, FilterDerainer
 from derain.models.outdet import OutDet
 from derain.scan import LARGEST_COORDINATE, Scan
+from derain.simulation.sensor import unit_vectors
 from derain.views.one_viewpoint import (
     FEWEST_RETURNS,
     crowding_far_off,
@@ -18,8 +19,6 @@ from derain.views.one_viewpoint import (
     rays_near_axes,
     viewpoint_issues,
 )
-
-from ..unit_vectors import unit_vectors
 
 # Where the sensor is above the road, metres.
 HEIGHT = 1.8
@@ -31,7 +30,7 @@ def rays(beams: int, steps: int, sector: float = 360.0, opening: float = 30.0) -
     """Directions of a sensor that looks ahead, 5 degrees down in the middle, (beams · steps, 3)."""
     inclination = np.linspace(-opening / 2, opening / 2, beams) - 5
     azimuth = np.linspace(-sector / 2, sector / 2, steps, endpoint=sector < 360)
-    return unit_vectors(azimuth, inclination[:, None]).reshape(-1, 3)
+    return unit_vectors(azimuth, inclination[:, None])
 
 
 def street(directions: Points, x: float = 0.0) -> Points:

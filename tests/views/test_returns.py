@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 from derain.evaluation.hard_cases import hard_cases
 from derain.files import read_scan
 from derain.scan import Scan
+from derain.simulation.sensor import unit_vectors
 from derain.views.directions import FEWEST_PAIRS, TOLERANCES, shared_direction_pairs
 from derain.views.return_columns import LEAST_APART
 from derain.views.returns import RayReturns, pair_returns
 
 from ..two_returns import Recording
-from ..unit_vectors import unit_vectors
 
 HARD_CASES = dict(hard_cases(largest=3000))
 CLEAN = ["kitti_hdl64.bin", "kitti_front.bin", "pandaset_pandar64.pcd", "ouster_os1_128.npz"]

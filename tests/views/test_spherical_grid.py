@@ -9,9 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from derain.errors import InputError
+from derain.simulation.sensor import unit_vectors
 from derain.views.spherical_grid import SphericalGrid, grid_of
-
-from ..unit_vectors import unit_vectors
 
 FULL = SphericalGrid.even(64, 2048, (-25, 15))
 FRONT = SphericalGrid.even(4, 8, (-20, 20), (-40, 40))
@@ -58,7 +57,7 @@ def test_the_middle_of_every_pixel_lies_in_it(grid) -> None:
     azimuth = left - (left - right) * (np.arange(grid.columns) + 0.5) / grid.columns
     middles = unit_vectors(azimuth, ((edges[1:] + edges[:-1]) / 2)[:, None])
     expected = np.arange(grid.rows * grid.columns)
-    np.testing.assert_array_equal(grid.pixel(middles.reshape(-1, 3)), expected)
+    np.testing.assert_array_equal(grid.pixel(middles), expected)
 
 
 @pytest.mark.parametrize("y", [0.0, -0.0])
