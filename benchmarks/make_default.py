@@ -5,11 +5,11 @@
 
 It is trained by `cues_worlds.yaml`, on worlds alone. Leaves ``model.onnx`` and ``model.ckpt`` in
 ``OUT/seed_<seed>``, and the table that the threshold was chosen by. That is the one of highest IoU
-over the worlds that were held out, raised until neither the dry ones among them together nor any
-clean scan that is given loses more than MOST_TAKEN, as long as that costs no more than MOST_LOST of
-the IoU. What is added to the log-odds of scans without intensities makes the model agree best with
-itself, as it judges unlabelled recordings with their intensities; it is no more than clean scans
-allow, judged without theirs. No label of a real scan is read.
+over the worlds that were held out, dry ones among them, raised until no clean scan that is given
+loses more than MOST_TAKEN, as long as that costs no more than MOST_LOST of the IoU. What is added to
+the log-odds of scans without intensities makes the model agree best with itself, as it judges
+unlabelled recordings with their intensities; it is no more than clean scans allow, judged without
+theirs. No label of a real scan is read.
 """
 
 import argparse
@@ -63,9 +63,8 @@ def main() -> None:
     unchosen = out / "unchosen.onnx"
     export(model, unchosen)
     derainer = Derainer(str(unchosen))
-    iou, of_dry = _on_worlds(derainer, _held_out(arguments.out / WORLDS))
-    taken = {"dry worlds": of_dry}
-    taken |= {Path(scan.name).name: _taken(derainer, scan) for scan in _scans(arguments.clean)}
+    iou = _on_worlds(derainer, _held_out(arguments.out / WORLDS))
+    taken = {Path(scan.name).name: _taken(derainer, scan) for scan in _scans(arguments.clean)}
     threshold = chosen(iou, taken)
     card = load_card("simulated")  # all its worlds have these classes
     spec = replace(
@@ -119,7 +118,7 @@ def chosen(iou: Mapping[float, float], taken: Mapping[str, Mapping[float, float]
 
     Args:
         iou: IoU over worlds held out, by threshold.
-        taken: Of dry worlds and each clean scan the share of points called rain, by threshold.
+        taken: Of each clean scan the share of points called rain, by threshold.
     """
     best = max(sorted(iou), key=lambda threshold: iou[threshold])
     possible = [t for t in sorted(iou) if t >= best and iou[t] >= iou[best] - MOST_LOST]
@@ -137,24 +136,17 @@ def _held_out(worlds: Path) -> Iterator[tuple[Scan, NDArray[np.bool_]]]:
 
 def _on_worlds(
     derainer: Derainer, labelled: Iterator[tuple[Scan, NDArray[np.bool_]]]
-) -> tuple[dict[float, float], dict[float, float]]:
-    """IoU of all scans together, and the share taken of the points of dry ones, by threshold."""
-    hit, either, taken = (np.zeros(len(THRESHOLDS)) for _ in range(3))
-    dry_points = 0
+) -> dict[float, float]:
+    """IoU of all scans together, by threshold."""
+    hit, either = (np.zeros(len(THRESHOLDS)) for _ in range(2))
     for scan, rain in labelled:
         probability = derainer.probability(scan)
-        is_dry = not rain.any()
-        dry_points += np.count_nonzero(scan.valid) if is_dry else 0
         for number, threshold in enumerate(THRESHOLDS):
             called = probability > threshold
             hit[number] += np.count_nonzero(called & rain)
             either[number] += np.count_nonzero(called | rain)
-            taken[number] += np.count_nonzero(called) if is_dry else 0
-    iou, share = hit / np.maximum(either, 1), taken / max(dry_points, 1)
-    return (
-        dict(zip(THRESHOLDS, iou.tolist(), strict=True)),
-        dict(zip(THRESHOLDS, share.tolist(), strict=True)),
-    )
+    iou = hit / np.maximum(either, 1)
+    return dict(zip(THRESHOLDS, iou.tolist(), strict=True))
 
 
 def _taken(derainer: Derainer, scan: Scan) -> dict[float, float]:
