@@ -106,7 +106,7 @@ class SplitSequences(ABC):
     seed: int
     DIGITS: ClassVar[int]
 
-    def _check_counts(self) -> None:
+    def __post_init__(self) -> None:
         for part in SPLIT_PARTS:
             _check_count(part, getattr(self, part), int(part == "train"))
         if self.seed < 0:
@@ -197,7 +197,7 @@ class Campaign(SplitSequences):
     DIGITS = 3
 
     def __post_init__(self) -> None:
-        self._check_counts()
+        super().__post_init__()
         _check_count("scans", self.scans, 1)
         if not self.rain_rates:
             raise InputError("rain rate", "none is given", "Give one or more, in mm/h.")
@@ -206,15 +206,13 @@ class Campaign(SplitSequences):
         if self.layout not in LAYOUTS:
             known = ", ".join(LAYOUTS)
             raise InputError("layout", f"'{self.layout}' is unknown", f"Take one of {known}.")
-        if self.drive is not None:
-            self._check(self.drive)
-
-    def _check(self, drive: Drive) -> None:
+        if self.drive is None:
+            return
         if self.layout != "street":
             raise InputError("drive", f"a {self.layout} has none", "Take the layout street.")
         if self.radar is not None:
             raise InputError("drive", "has no radar", "Leave the radar out.")
-        drive.length(self.times[-1])
+        self.drive.length(self.times[-1])
 
     @property
     def lidar(self) -> Sensor:

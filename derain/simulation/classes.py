@@ -21,12 +21,12 @@ class TrackClass(IntEnum):
     ROAD = 7
 
 
-def packed(kind: Ints, thing: Ints) -> Ints:
+def packed(kind: Ints, thing: Ints | int) -> Ints:
     """Classes with the number of the moving thing in the upper 16 bits, int64 (N,).
 
     Args:
         kind: TrackClass, int64 (N,).
-        thing: Number from 1 on, int64 (N,); 0 does not move.
+        thing: Number from 1 on, of each, int64 (N,), or of all; 0 does not move.
     """
     return kind | thing << 16
 

@@ -148,11 +148,8 @@ def _with_second_returns(returns: Returns, row: Ints, second: Returns, share: Fl
     """Adds a second return to the beams of some rows; the two returns share the beam's power."""
     first = returns.reflectivity.copy()
     first[row] *= 1 - share
-    both = [
-        replace(returns, reflectivity=first),
-        replace(second, reflectivity=share * second.reflectivity, beam=returns.beam[row]),
-    ]
-    joined = Returns.joined(both)
+    second = replace(second, reflectivity=share * second.reflectivity, beam=returns.beam[row])
+    joined = Returns.joined([replace(returns, reflectivity=first), second])
     added = len(returns.beam) + np.arange(len(row))
     weaker = joined.power[added] <= joined.power[row]  # and so comes after the other
     return joined.take(np.insert(np.arange(len(returns.beam)), row + weaker, added))

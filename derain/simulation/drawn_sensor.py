@@ -8,7 +8,6 @@ from typing import Any, ClassVar, get_args
 import numpy as np
 from numpy.random import Generator
 
-from derain.simulation.arrays import Floats
 from derain.simulation.defects import Defects
 from derain.simulation.drawing import Span, log_uniform, pick
 from derain.simulation.sensor import MOST_BEAMS, ReturnMode, Sensor
@@ -214,10 +213,8 @@ def draw_defects(spans: DefectSpans, generator: Generator, *, dual: bool) -> Def
     has = {name: some and generator.random() < spans.each for name in DEFECTS}
     if dual:
         values["copies"], has["copies"] = 1.0, generator.random() < 0.5
-    return Defects(
-        **{name: value for name, value in values.items() if has[name]},
-        merging=spans.draw("merging", generator),
-    )
+    drawn = {name: value for name, value in values.items() if has[name]}
+    return Defects(**drawn, merging=spans.draw("merging", generator))
 
 
 def _spinning(spans: SensorSpans, generator: Generator) -> dict[str, Any]:
@@ -312,15 +309,11 @@ def draw_row_table(
         band = np.clip([generator.uniform(*span) for span in DENSE_BAND], lowest, highest)
         closer = generator.uniform(*HOW_MUCH_CLOSER)
         corners, density = np.array([lowest, *band, highest]), np.array([1.0, closer, 1.0])
-    table = _spaced(corners, density, rows)
+    # Rows are even in the density summed up from the lowest corner, and so closer where it is high.
+    passed = np.concatenate([[0.0], np.cumsum(density * np.diff(corners))])
+    table = np.interp(np.linspace(0, passed[-1], rows), passed, corners)
     table += MISALIGNMENT * np.gradient(table) * generator.normal(size=rows)
     return tuple(np.clip(np.sort(table), lowest, highest)[::-1].round(3).tolist())
-
-
-def _spaced(corners: Floats, density: Floats, count: int) -> Floats:
-    """So many places from the first corner to the last, spaced by the density between corners."""
-    passed = np.concatenate([[0.0], np.cumsum(density * np.diff(corners))])
-    return np.asarray(np.interp(np.linspace(0, passed[-1], count), passed, corners))
 
 
 def draw_row_azimuths(rows: int, most: float, generator: Generator) -> tuple[float, ...]:

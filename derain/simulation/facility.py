@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.random import Generator
 
-from derain.simulation import objects, shapes
+from derain.simulation import objects
 from derain.simulation.arrays import Floats
 from derain.simulation.classes import TrackClass
 from derain.simulation.objects import Surface
@@ -54,11 +54,7 @@ def on_slope(surfaces: Iterable[Surface], aside: float, heading: float, slope: F
         heading: Angle by which they are turned first, radians from x towards y.
         slope: Rise of the ground per metre ahead and per metre to the left, (2,).
     """
-    ahead, left = slope
-    return Track.of(
-        replace(surface, triangles=shapes.sloped(surface.triangles, ahead, left))
-        for surface in (surface.placed(0, aside, heading) for surface in surfaces)
-    )
+    return Track.of(surface.placed(0, aside, heading).sloped(*slope) for surface in surfaces)
 
 
 def road_and_ground(half_width: float, generator: Generator) -> Iterator[Surface]:

@@ -43,6 +43,10 @@ class Surface:
         """The same surface, moved by metres along the three axes."""
         return replace(self, triangles=self.triangles + np.array([x, y, z]))
 
+    def sloped(self, ahead: float, left: float) -> "Surface":
+        """The same surface, raised by a share of its x and of its y, as on sloping ground."""
+        return replace(self, triangles=shapes.sloped(self.triangles, ahead, left))
+
 
 # Something made at the origin, of one surface or of several.
 Make = Callable[[Generator], Surface | Iterable[Surface]]

@@ -174,12 +174,10 @@ def detect(mean: Floats, radar: Radar, generator: Generator) -> Scan:
     xyz = np.stack([away * direction for direction in directions], axis=1).astype(np.float32)
     # A drop falls straight down, and so comes nearer if it is above the radar.
     speed = np.where(label == TrackClass.RAIN, -FALL_SPEED * np.sin(pitch), 0.0)
-    measured = {
-        "doppler": speed + generator.normal(0, radar.doppler_noise, len(label)),
-        "rcs": 10 * np.log10(echo[found]),
-    }
+    doppler = speed + generator.normal(0, radar.doppler_noise, len(label))
     fields = dict(zip("xyz", xyz.T, strict=True))
-    fields |= {name: column.astype(np.float32) for name, column in measured.items()}
+    fields["doppler"] = doppler.astype(np.float32)
+    fields["rcs"] = (10 * np.log10(echo[found])).astype(np.float32)
     return Scan(xyz, label=label, fields=fields, name="radar frame")
 
 

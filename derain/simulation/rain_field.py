@@ -165,9 +165,8 @@ class SprinkledRain:
 
 
 def _unknown_rate_error(rate: float) -> InputError:
-    return InputError(
-        "rain rate", f"{rate} mm/h is no rain rate", f"Give up to {HARDEST_RAIN:g} mm/h."
-    )
+    reason = f"{rate} mm/h is no rain rate"
+    return InputError("rain rate", reason, f"Give up to {HARDEST_RAIN:g} mm/h.")
 
 
 # Drop-size distribution N(D) = INTERCEPT · exp(−slope · D), in m⁻³ mm⁻¹.

@@ -8,7 +8,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from derain.files.columns import INTENSITY_NAMES
-from derain.scan import Scan, to_float32
+from derain.scan import Scan, named, to_float32
 from derain.simulation.arrays import Bools, Floats, Ints
 from derain.simulation.classes import TrackClass
 from derain.simulation.rain import rain_on_beams
@@ -66,10 +66,22 @@ def rain_on_scan(scan: Scan, rain: RainField, sensor: Sensor, generator: Generat
     one_return = replace(sensor, returns="last" if sensor.returns == "last" else "strongest")
     detected = rain_on_beams(clear, direction, rain, one_return, generator)
 
-    rained = _with_drops(scan.take(beams.row), exposed, direction, detected, sensor, generator)
+    wet = detected.label == TrackClass.RAIN
+    kept = detected.returned & ~wet
+    rained = scan.take(beams.row)
+    label = np.zeros(len(rained), np.int64) if rained.label is None else rained.label.copy()
+    label[exposed] = np.where(kept, label[exposed], detected.label)
+    distance = sensor.measured_range(detected.range[wet], generator)
+    drops = direction[wet] * distance[:, None]
+    rained = with_points(rained.with_label(label), exposed[wet], drops)
     if scan.intensity is not None:
         if measured.intensity is not None:
-            intensity = _intensity(scan, row, clear, detected, sensor, generator)
+            intensity = scan.intensity[row].astype(np.float64)
+            # The recorded value is dimmed as much as the light. It is not computed from the
+            # reflectivity, which may have been drawn at random.
+            intensity[kept] *= detected.reflectivity[kept] / clear.reflectivity[kept]
+            of_drops = sensor.measured_intensity(detected.reflectivity[wet], generator)
+            intensity[wet] = full_scale([scan]) * (of_drops / FULL_SCALE_INTENSITY)
         else:
             anywhere = beams.row[beams.returned][:1]
             intensity = np.resize(scan.intensity[anywhere].astype(np.float64), len(row))
@@ -93,46 +105,9 @@ def _clear_air(
     # The random numbers are at least 0 and less than 1, so there is no division by 0.
     excess = 1 / (1 - generator.random(len(row)))
     reflectivity = np.where(reflectivity < needed, needed * excess, reflectivity)
-    return Returns(
-        range_,
-        np.where(returned, reflectivity, 0),
-        np.full(len(row), TrackClass.BACKGROUND, np.int64),
-        np.arange(len(row)),
-    )
-
-
-def _with_drops(
-    scan: Scan,
-    exposed: Ints,
-    direction: Floats,
-    detected: Returns,
-    sensor: Sensor,
-    generator: Generator,
-) -> Scan:
-    """Puts the drops that were detected in the rows of their beams, and labels every row."""
-    wet = detected.label == TrackClass.RAIN
-    distance = sensor.measured_range(detected.range[wet], generator)
-    label = np.zeros(len(scan), np.int64) if scan.label is None else scan.label.copy()
-    kept = detected.returned & ~wet
-    label[exposed] = np.where(kept, label[exposed], detected.label)
-    moved = with_points(scan, exposed[wet], direction[wet] * distance[:, None])
-    return moved.with_label(label)
-
-
-def _intensity(
-    scan: Scan, row: Ints, clear: Returns, detected: Returns, sensor: Sensor, generator: Generator
-) -> Floats:
-    """Intensity of every detected return in the scan's unit, float64 (E,)."""
-    assert scan.intensity is not None
-    wet = detected.label == TrackClass.RAIN
-    kept = detected.returned & ~wet
-    intensity = scan.intensity[row].astype(np.float64)
-    # The recorded value is dimmed as much as the light. It is not computed from the reflectivity,
-    # which may have been drawn at random.
-    intensity[kept] *= detected.reflectivity[kept] / clear.reflectivity[kept]
-    share = sensor.measured_intensity(detected.reflectivity[wet], generator) / FULL_SCALE_INTENSITY
-    intensity[wet] = full_scale([scan]) * share
-    return intensity
+    reflectivity = np.where(returned, reflectivity, 0)
+    label = np.full(len(row), TrackClass.BACKGROUND, np.int64)
+    return Returns(range_, reflectivity, label, np.arange(len(row)))
 
 
 def _emptied(rained: Scan, rows: Ints, scan: Scan) -> Scan:
@@ -183,8 +158,9 @@ def with_intensity(scan: Scan, rows: Ints, intensity: Floats) -> Scan:
             numbers.
     """
     assert scan.intensity is not None
-    by_lower_case = {name.lower(): name for name in scan.fields}
-    found = [by_lower_case[name] for name in INTENSITY_NAMES if name in by_lower_case][:1]
+    names = {name: name for name in scan.fields}
+    known = (named(names, name, scan.name) for name in INTENSITY_NAMES)
+    found = [name for name in known if name is not None][:1]
     fields = {name: _written(scan.fields[name], rows, intensity) for name in found}
     # The scan's intensity is what its file holds: rounded if that is a column of whole numbers.
     seen = [column[rows] for column in fields.values()] or [intensity]

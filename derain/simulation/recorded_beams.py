@@ -8,7 +8,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from derain.scan import Scan
-from derain.simulation.arrays import Bools, Floats, Ints
+from derain.simulation.arrays import Bools, Columns, Floats, Ints
 from derain.simulation.sensor import unit_vectors
 from derain.views.directions import directions
 from derain.views.grid_fit import GridFit, fit_grid
@@ -24,7 +24,7 @@ FARTHEST_STRAY = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class RecordedBeams:
+class RecordedBeams(Columns):
     """The beams of a recorded scan: first one for each of its N rows, then those without a row.
 
     Attributes:
@@ -72,14 +72,10 @@ def find_beams(scan: Scan, generator: Generator) -> RecordedBeams:
         if len(stray) and np.median(stray) > np.radians(FARTHEST_STRAY):
             usual = np.full_like(usual, np.nan)
         return RecordedBeams(rows, np.where(valid[:, None], own, usual), valid)
+    recorded = RecordedBeams(rows, own, valid)
     if not valid.any():
-        return RecordedBeams(rows, own, valid)
-    before, direction = _unreturned(scan, valid, generator)
-    return RecordedBeams(
-        np.concatenate([rows, before]),
-        np.concatenate([own, direction]),
-        np.concatenate([valid, np.zeros(len(before), bool)]),
-    )
+        return recorded
+    return RecordedBeams.joined([recorded, _unreturned(scan, valid, generator)])
 
 
 def _cell_directions(scan: Scan, valid: Bools) -> Floats:
@@ -113,8 +109,8 @@ def _polished(angle: Floats) -> Floats:
     return of_row + of_column
 
 
-def _unreturned(scan: Scan, valid: Bools, generator: Generator) -> tuple[Ints, Floats]:
-    """Row of the return before, int64 (E,), and direction, float64 (E, 3), of unreturned beams."""
+def _unreturned(scan: Scan, valid: Bools, generator: Generator) -> RecordedBeams:
+    """The beams that returned nothing, found as empty pixels of a grid."""
     seen = np.flatnonzero(valid)
     fit = fit_grid([scan.take(seen)])
     pixels = fit.grid.rows * fit.grid.columns
@@ -127,7 +123,8 @@ def _unreturned(scan: Scan, valid: Bools, generator: Generator) -> tuple[Ints, F
     chosen = np.sort(generator.choice(empty, count, replace=False))
     by_pixel = np.argsort(pixel, kind="stable")
     before = np.searchsorted(pixel[by_pixel], chosen) - 1
-    return seen[by_pixel[np.maximum(before, 0)]], unit_vectors(*_pixel_angles(fit, chosen))
+    row = seen[by_pixel[np.maximum(before, 0)]]
+    return RecordedBeams(row, unit_vectors(*_pixel_angles(fit, chosen)), np.zeros(len(row), bool))
 
 
 def _looked_at(fit: GridFit, xyz: NDArray[np.float32], pixel: Ints) -> Bools:

@@ -129,10 +129,8 @@ class SimulatedScene:
         if self.course is None:
             yield from repeat(self.track.cast(sensor), len(times))
             return
-        things = [
-            (_numbered(number, thing.surface), thing.velocity)
-            for number, thing in enumerate(self.traffic, 1)
-        ]
+        numbered = enumerate(self.traffic, 1)
+        things = [(_numbered(number, thing.surface), thing.velocity) for number, thing in numbered]
         for time in times:
             sent, pose = self._moments(self.course, time, sensor)
             seen = self.track.cast(sensor, pose)
@@ -155,7 +153,7 @@ class SimulatedScene:
 def _numbered(number: int, surface: Surface) -> Track:
     """A track of one thing that moves, where it is at the first scan, labelled with its number."""
     track = Track.of([surface])
-    return replace(track, label=packed(track.label, np.full_like(track.label, number)))
+    return replace(track, label=packed(track.label, number))
 
 
 def _followed(pose: Floats, sent: Floats, velocity: Floats) -> Floats:

@@ -230,19 +230,15 @@ class Sensor(Settings):
             One row for each beam, in their order; of a sensor with dual returns a second one where
             the last return is not the strongest.
         """
+        power = candidates.power
         # A surface ends its beam: where it is seen, it is the last return.
         distance = np.where(candidates.returned, candidates.range, 0)
-        match self.returns:
-            case "strongest":
-                chosen = _greatest(candidates.power, candidates.beam)
-            case "last":
-                chosen = _greatest(distance, candidates.beam)
-            case "dual":
-                strongest = _greatest(candidates.power, candidates.beam)
-                last = _greatest(distance, candidates.beam)
-                both = np.stack([strongest, last], axis=1)
-                chosen = both[np.stack([np.ones_like(last, bool), last != strongest], axis=1)]
-        return candidates.take(chosen)
+        scores = {"strongest": [power], "last": [distance], "dual": [power, distance]}
+        rows = [_greatest(score, candidates.beam) for score in scores[self.returns]]
+        chosen = np.stack(rows, axis=1)
+        # The second of two only where it is another one.
+        another = np.diff(chosen, axis=1, prepend=-1) != 0
+        return candidates.take(chosen[another])
 
     def measure(self, returns: Returns, generator: Generator) -> Scan:
         """Turns the returns into a scan, with the noise of the measurement.
@@ -261,11 +257,8 @@ class Sensor(Settings):
         distance = self.measured_range(seen.range, generator, seen.power)
         intensity = self.measured_intensity(seen.reflectivity, generator)
         direction = self._measured_directions(seen.beam, generator)
-        scan = Scan(
-            (direction * self.defects.stepped(distance)[:, None]).astype(np.float32),
-            intensity.astype(np.float32),
-            seen.label,
-        )
+        xyz = direction * self.defects.stepped(distance)[:, None]
+        scan = Scan(xyz.astype(np.float32), intensity.astype(np.float32), seen.label)
         return scan.take(self.defects.reported(seen.beam, generator))
 
     def _measured_directions(self, beam: Ints, generator: Generator) -> Floats:

@@ -127,21 +127,21 @@ def quads(first: Floats, second: Floats, third: Floats, fourth: Floats) -> Trian
 
 
 def rods(
-    starts: Floats, ends: Floats, radius: Floats | float, taper: float = 1.0, sides: int = 3
+    starts: Floats, ends: Floats, radius: float, taper: float = 1.0, sides: int = 3
 ) -> Triangles:
     """Thin straight rods without caps.
 
     Args:
         starts: Begin of each, (R, 3), metres.
         ends: End of each, elsewhere, (R, 3), metres.
-        radius: From axis to edge at its start, of each, (R,), or of all, metres.
+        radius: From axis to edge at the start of each, metres.
         taper: Radius at the end over that at the start.
         sides: Sides of each.
     """
     first, second = across(ends - starts)
     angle = np.arange(sides) * (2 * np.pi / sides)
     ring = np.cos(angle)[:, None] * first[:, None] + np.sin(angle)[:, None] * second[:, None]
-    ring *= np.broadcast_to(radius, len(starts))[:, None, None]
+    ring *= radius
     lower, upper = starts[:, None] + ring, ends[:, None] + taper * ring
     following = (np.arange(sides) + 1) % sides
     return quads(lower, lower[:, following], upper[:, following], upper)
@@ -155,19 +155,18 @@ def bars(
     return rods(both[:, 0], both[:, 1], radius, taper, sides)
 
 
-def blades(starts: Floats, ends: Floats, width: Floats | float, generator: Generator) -> Triangles:
+def blades(starts: Floats, ends: Floats, width: float, generator: Generator) -> Triangles:
     """One flat triangle from each start, where it is wide, to a point: a blade of grass, a twig.
 
     Args:
         starts: Begin of each, (B, 3), metres.
         ends: End of each, elsewhere, (B, 3), metres.
-        width: At the start, of each, (B,), or of all, metres.
+        width: At the start of each, metres.
         generator: Turns each about its length.
     """
     first, second = across(ends - starts)
     angle = generator.uniform(0, np.pi, (len(starts), 1))
-    half = np.broadcast_to(width, len(starts))[:, None] / 2
-    aside = half * (np.cos(angle) * first + np.sin(angle) * second)
+    aside = width / 2 * (np.cos(angle) * first + np.sin(angle) * second)
     return np.stack([starts - aside, starts + aside, ends], axis=1)
 
 

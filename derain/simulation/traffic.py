@@ -142,14 +142,16 @@ def draw_traffic(
         draw = WAYS[number % len(WAYS)]
         for _ in range(TRIES):
             time = generator.uniform(0, times[-1])
-            thing = _moving(*draw(street, speed * time, generator), time)
+            surface, place, heading, pace = draw(street, speed * time, generator)
+            velocity = pace * np.array([np.cos(heading), np.sin(heading)])
+            x, y = place - time * velocity
+            thing = MovingThing(surface.placed(x, y, heading), velocity)
             bounds = thing.bounds(times)
             if not any(_meet(bounds, other) for other in taken):
                 break
         else:
-            raise InputError(
-                "traffic", f"the street has no room for {count}", f"Give {number} or fewer."
-            )
+            reason = f"the street has no room for {count}"
+            raise InputError("traffic", reason, f"Give {number} or fewer.")
         taken.append(bounds)
         things.append(thing)
     return things
@@ -159,15 +161,6 @@ def _meet(first: Floats, second: Floats) -> bool:
     """True if bounds, float64 (T, 2, 2) each, come nearer than the clearance at one time."""
     apart = (first[:, 0] > second[:, 1] + KEPT_APART) | (second[:, 0] > first[:, 1] + KEPT_APART)
     return bool((~apart.any(axis=1)).any())
-
-
-def _moving(
-    surface: Surface, place: tuple[float, float], heading: float, speed: float, time: float
-) -> MovingThing:
-    """A thing that is at a place at some time, and moves where it heads."""
-    velocity = speed * np.array([np.cos(heading), np.sin(heading)])
-    x, y = place - time * velocity
-    return MovingThing(surface.placed(x, y, heading), velocity)
 
 
 # A thing, where it is when it is near the sensor, where it heads, radians, and its speed, m/s.

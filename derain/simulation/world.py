@@ -144,9 +144,6 @@ class WorldCampaign(SplitSequences):
     world: World | str = field(default_factory=World)
     DIGITS = 5
 
-    def __post_init__(self) -> None:
-        self._check_counts()
-
     def resolved(self) -> Self:
         """The same with its world read.
 

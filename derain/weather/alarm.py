@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any
 
 from derain.errors import InputError
 from derain.weather.visibility import NOT_KNOWN, Visibility
@@ -42,11 +41,11 @@ class Threshold:
 
     def __post_init__(self) -> None:
         if not 0 < self.below < self.above < math.inf:
-            raise InputError(
-                "alarm",
-                f"a level from below {self.below:g} m to {self.above:g} m or more",
-                "Give two numbers of metres, the second one greater than the first, e.g. 30 40.",
+            reason = f"a level from below {self.below:g} m to {self.above:g} m or more"
+            remedy = (
+                "Give two numbers of metres, the second one greater than the first, e.g. 30 40."
             )
+            raise InputError("alarm", reason, remedy)
 
 
 # What a car needs to stop from 50 and from 30 km/h: 28 and 13 m, by one second of reaction and
@@ -131,9 +130,8 @@ class Alarm:
         hold: int = HOLD,
         dry: Visibility | None = None,
     ) -> None:
-        given: Any = hold  # whatever a user gave
-        if not (isinstance(given, int) and not isinstance(given, bool) and given >= 1):
-            raise InputError("alarm", f"hold is {given}", "Give a whole number of 1 or more.")
+        if isinstance(hold, bool) or not isinstance(hold, int) or hold < 1:
+            raise InputError("alarm", f"hold is {hold}", "Give a whole number of 1 or more.")
         if not (error.below < warning.below and error.above < warning.above):
             raise InputError(
                 "alarm",

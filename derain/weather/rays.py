@@ -131,9 +131,8 @@ def _scores(reach: NDArray[np.float32], rain: NDArray[np.bool_]) -> NDArray[np.i
 
 def _counted(ends: NDArray[np.int32]) -> NDArray[np.int64]:
     """Numbers of rays by what they end at, sector and bin, int64 (2, RAY_SECTORS, RANGE_BINS)."""
-    counts = np.bincount(ends, minlength=RAY_SECTORS * SCORES_IN_SECTOR).reshape(
-        RAY_SECTORS, SCORES_IN_SECTOR
-    )
+    counts = np.bincount(ends, minlength=RAY_SECTORS * SCORES_IN_SECTOR)
+    counts = counts.reshape(RAY_SECTORS, SCORES_IN_SECTOR)
     rain = counts[:, ::-1]
     return np.stack([counts[:, :RANGE_BINS], rain[:, :RANGE_BINS]]).astype(np.int64)
 
@@ -155,11 +154,14 @@ def repetitions(numbers: NDArray[np.uint32]) -> tuple[NDArray[np.intp], NDArray[
         None of these is in the first, so that leaving the first out leaves each number once.
     """
     table = np.empty(1 << max(2 * len(numbers), 2).bit_length(), np.int32)
+    lower = np.uint32(33 - len(table).bit_length())  # the bits of a hash that number no slot
     multiplier, pending = MULTIPLIER, numbers
     places = np.arange(len(numbers), dtype=np.int32)
     repeating, repeated = [places[:0]], [places[:0]]
     while len(pending):
-        found = _last_in_slot(pending, places, multiplier, table)
+        slot = (pending * np.uint32(multiplier) >> lower).astype(np.intp)
+        table[slot] = places  # only slots that were written to are read, so that it needs no zeros
+        found = table.take(slot)
         equal = numbers.take(found) == pending
         # take is several times faster than indexing by truth values that follow no pattern.
         repeats, sharing = np.flatnonzero(equal & (found != places)), np.flatnonzero(~equal)
@@ -187,16 +189,3 @@ def seem_distinct(numbers: NDArray[np.uint32]) -> bool:
     """
     sampled = np.flatnonzero(numbers * np.uint32(NEXT_MULTIPLIER) < 2**32 // ONE_IN)
     return len(sampled) >= FEWEST_SAMPLED and not len(repetitions(numbers.take(sampled))[0])
-
-
-def _last_in_slot(
-    numbers: NDArray[np.uint32],
-    places: NDArray[np.int32],
-    multiplier: int,
-    table: NDArray[np.int32],
-) -> NDArray[np.int32]:
-    """The last place written to the slot of each number."""
-    lower = np.uint32(33 - len(table).bit_length())
-    slot = (numbers * np.uint32(multiplier) >> lower).astype(np.intp)
-    table[slot] = places  # only slots that were written to are read, so that it needs no zeros
-    return table.take(slot)

@@ -55,11 +55,8 @@ class ScanWeather:
         """
         scan, rain = Scan.of(points), np.asarray(rain)
         if rain.shape != (len(scan),) or rain.dtype != np.bool_:
-            raise InputError(
-                "rain",
-                f"it is {rain.dtype} of shape {rain.shape} for {len(scan):,} points",
-                "Give True or False for each point.",
-            )
+            reason = f"it is {rain.dtype} of shape {rain.shape} for {len(scan):,} points"
+            raise InputError("rain", reason, "Give True or False for each point.")
         return cls(ray_ends(scan, rain))
 
     @classmethod
@@ -142,9 +139,8 @@ class ScanWeather:
         """
         odd = [number for number in sectors if not 0 <= number < RAY_SECTORS]
         if odd or not sectors:
-            raise InputError(
-                "sectors", f"{odd or 'none'}", f"Give numbers from 0 to {RAY_SECTORS - 1}."
-            )
+            remedy = f"Give numbers from 0 to {RAY_SECTORS - 1}."
+            raise InputError("sectors", f"{odd or 'none'}", remedy)
         return visibility_of(*self.ends[:, list(sectors)].sum(axis=1))
 
 

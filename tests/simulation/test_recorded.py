@@ -269,3 +269,12 @@ def test_intensities_are_rounded_to_what_the_column_that_is_read_holds() -> None
     assert relit.intensity.tolist() == [0, 13, 2, 3, 255, 5]
     assert not relit.fields["signal"].any()
     assert equal(scan.fields["Intensity"], np.arange(6, dtype=np.uint8))
+
+
+def test_intensities_are_written_to_the_column_that_is_read_from_the_file() -> None:
+    own, other = np.arange(6, dtype=np.float32), np.zeros(6, np.float32)
+    relit = with_intensity(
+        from_parameters(xyz=COORDINATES, intensity=own, Intensity=other), ROWS, np.array([7, 8])
+    )
+    assert relit.intensity[ROWS].tolist() == relit.fields["intensity"][ROWS].tolist() == [7, 8]
+    assert not relit.fields["Intensity"].any()

@@ -242,10 +242,6 @@ def draw_haze(
     in_front = distance < np.minimum(clear.range[lit], optics.farthest)
     lit, distance = lit[in_front], distance[in_front]
     power = optics.threshold * ratio[in_front]
-    return Returns(
-        distance,
-        # Upwards, so that no return falls short of the threshold by rounding.
-        np.minimum(power * distance**2 * (1 + 1e-9), 1),
-        np.full(len(lit), int(TrackClass.RAIN)),
-        lit,
-    )
+    # Upwards, so that no return falls short of the threshold by rounding.
+    reflectivity = np.minimum(power * distance**2 * (1 + 1e-9), 1)
+    return Returns(distance, reflectivity, np.full(len(lit), int(TrackClass.RAIN)), lit)

@@ -116,9 +116,8 @@ class Optics:
         Infinite where not even one that fills the beam is.
         """
         needed = range * math.sqrt(self.threshold / self.brightness)
-        return np.where(
-            (needed <= 1) & (range <= self.farthest), self.width(range) * needed, math.inf
-        )
+        seen = (needed <= 1) & (range <= self.farthest)
+        return np.where(seen, self.width(range) * needed, math.inf)
 
 
 # Slices that the beams are cut into, evenly spaced on a logarithmic scale.
@@ -135,6 +134,12 @@ class Slices:
         near: Begin of the first slice, metres.
         optics: The beams.
         sizes: Of the particles.
+
+    Attributes:
+        near: Begin of each slice, float64 (SLICES,), metres.
+        far: End of each slice, float64 (SLICES,), metres.
+        width: Width of the beam at that end, float64 (SLICES,), metres.
+        met: Particles met in each slice for one per cubic metre, float64 (SLICES,), at most.
     """
 
     def __init__(self, near: float, optics: Optics, sizes: Sizes) -> None:
@@ -142,15 +147,11 @@ class Slices:
         self.near, self.far = edges[:-1], edges[1:]
         # A slice is drawn as wide as at its far end, and with the sizes seen at its near end.
         self.width = optics.width(self.far)
-        self.visible = sizes.diameter >= optics.smallest_visible(self.near)[:, None]
+        visible = sizes.diameter >= optics.smallest_visible(self.near)[:, None]
         area = np.pi / 4 * (self.width[:, None] + sizes.diameter) ** 2
-        self._cumulative = np.cumsum(self.visible * sizes.share * area, axis=1)
+        self._cumulative = np.cumsum(visible * sizes.share * area, axis=1)
         self._diameter = sizes.diameter
-
-    @property
-    def met(self) -> Floats:
-        """Particles met in each slice for one per cubic metre, float64 (SLICES,), at most."""
-        return np.asarray(self._cumulative[:, -1] * (self.far - self.near))
+        self.met: Floats = self._cumulative[:, -1] * (self.far - self.near)
 
     def draw_diameters(self, slice_number: int, count: int, generator: Generator) -> Floats:
         """Diameters of particles that a beam meets in a slice, float64 (count,), metres."""

@@ -122,9 +122,8 @@ class GroundLayer:
         with np.errstate(divide="ignore", invalid="ignore"):
             crossing = np.nan_to_num(top / rise, nan=math.inf)
         if top > 0:  # beams that rise leave the layer
-            return Stretch(
-                stretch.near, np.where(rise > 0, np.minimum(stretch.far, crossing), stretch.far)
-            )
+            leaves = np.where(rise > 0, np.minimum(stretch.far, crossing), stretch.far)
+            return Stretch(stretch.near, leaves)
         enters = np.where(rise < 0, np.maximum(stretch.near, crossing), math.inf)
         return Stretch(enters, stretch.far)
 
@@ -165,9 +164,8 @@ class Plume:
         radius = math.hypot(self.length / 2, self._half_width(self.length), 2 * PLUME_HEIGHT)
         along = beams @ centre
         half = np.sqrt(np.maximum(radius**2 - (centre @ centre - along**2), 0))
-        return Stretch(
-            np.maximum(stretch.near, along - half), np.minimum(stretch.far, along + half)
-        )
+        enters, leaves = along - half, along + half
+        return Stretch(np.maximum(stretch.near, enters), np.minimum(stretch.far, leaves))
 
     def density(self, place: Floats) -> Floats:
         """Falls to 1/e halfway along it, and over a third of its height."""
@@ -208,7 +206,6 @@ def draw_plumes(
         near = np.linalg.norm(points[:, :2] - point[:2], axis=1) < CAR_LENGTH
         tail = direction * (direction * points[near, 0]).max()
         middle = (points[near, 1].min() + points[near, 1].max()) / 2
-        plumes.append(
-            Plume(np.array([tail, middle, ground]), np.array([direction, 0.0, 0.0]), length)
-        )
+        start, heading = np.array([tail, middle, ground]), np.array([direction, 0.0, 0.0])
+        plumes.append(Plume(start, heading, length))
     return plumes

@@ -54,21 +54,15 @@ def lay_out_carrier(generator: Generator, mounting_height: float) -> Iterator[Su
     painted = generator.choice(PAINTED)
     for part in carrier(generator, mounting_height):
         standing = shapes.raised(shapes.placed(part, 0, 0, heading), mounting_height)
-        yield from _finished(standing, mounting_height, painted, generator)
-
-
-def _finished(
-    part: Triangles, mounting_height: float, painted: float, generator: Generator
-) -> Iterator[Surface]:
-    """A part as paint that returns, or as a mirror with specks on it, or as the specks alone."""
-    surface = Surface(part, TrackClass.BACKGROUND, log_uniform(PAINT, generator))
-    if generator.random() < painted:
-        yield surface
-        return
-    count = round(log_uniform(SPECKS_OF_A_CARRIER, generator))
-    shining = mirrored(surface, np.array([0, 0, mounting_height]), count, generator)
-    hides = generator.random() < 0.7
-    yield from shining if hides else islice(shining, 1, None)
+        surface = Surface(standing, TrackClass.BACKGROUND, log_uniform(PAINT, generator))
+        if generator.random() < painted:
+            yield surface
+            continue
+        # What is no paint is a mirror with specks on it, or the specks alone.
+        count = round(log_uniform(SPECKS_OF_A_CARRIER, generator))
+        shining = mirrored(surface, np.array([0, 0, mounting_height]), count, generator)
+        hides = generator.random() < 0.7
+        yield from shining if hides else islice(shining, 1, None)
 
 
 def _car(generator: Generator, mounting_height: float) -> Parts:

@@ -52,9 +52,8 @@ def lay_out_country(generator: Generator) -> Track:
     a bank with gaps, trees, and a field, a meadow or snow beyond. People, cyclists and cars are on
     the road and beside it, poles and cables follow it. In winter nothing has leaves.
     """
-    road = Road(
-        generator.uniform(-3, 3), generator.uniform(-0.002, 0.002), generator.uniform(1.5, 3.5)
-    )
+    aside, bend = generator.uniform(-3, 3), generator.uniform(-0.002, 0.002)
+    road = Road(aside, bend, half_width=generator.uniform(1.5, 3.5))
     winter = generator.random() < 0.4
     snowy = winter and generator.random() < 0.5
     standing = [

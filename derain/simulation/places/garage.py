@@ -43,13 +43,10 @@ def lay_out_garage(generator: Generator) -> Track:
         [ground.CONCRETE], lambda x, y: np.zeros(np.shape(x), np.int64), generator
     )
     uneven = ground.Relief.draw(generator.uniform(0.003, 0.03), generator)
-    return placing.assemble(floor, standing, uneven, generator, [_ceiling(hall, generator)])
-
-
-def _ceiling(hall: Walls, generator: Generator) -> Surface:
     length, width = hall.x[1] - hall.x[0], hall.y[1] - hall.y[0]
     rough = walls.rough_wall(length, width, generator, cell=0.6)
-    return walls.laid_flat(rough, (hall.x[0], hall.y[0]), hall.height)
+    ceiling = walls.laid_flat(rough, (hall.x[0], hall.y[0]), hall.height)
+    return placing.assemble(floor, standing, uneven, generator, [ceiling])
 
 
 def _under_the_ceiling(hall: Walls, generator: Generator) -> Iterator[Surface]:
@@ -136,9 +133,8 @@ def _cages(hall: Walls, generator: Generator) -> Iterator[Surface]:
         lambda length, drawn: openwork.net(length, hall.height - 0.1, drawn),
         openwork.scaffold,
     ]
-    for x, y in placing.free_places(
-        int(generator.integers(2, 6)), (2.5, 20), 2.5, generator, hall.holds
-    ):
+    count = int(generator.integers(2, 6))
+    for x, y in placing.free_places(count, (2.5, 20), 2.5, generator, hall.holds):
         make = kinds[generator.integers(len(kinds))]
         reach = min(generator.uniform(1.5, 7), hall.x[1] - x)
         pieces = placing.line_up(make, 0, (0, reach + 0.1), reach, generator)

@@ -114,19 +114,15 @@ def ground_mesh(
     kind = np.repeat(kind[:-1, :-1].ravel(), 2)
     wetness = Relief.draw(1, generator)(*triangles.mean(axis=1)[:, :2].T)
     for number, each in enumerate(kinds):
-        mine = kind == number
-        if mine.any():
-            yield _patch(each, triangles[mine], wetness[mine], generator)
-
-
-def _patch(
-    kind: GroundKind, triangles: shapes.Triangles, wetness: Floats, generator: Generator
-) -> Surface:
-    """All ground of a kind: uneven in reflectivity from spot to spot, dark where it is wet."""
-    usual = log_uniform(kind.reflectivity, generator)
-    spots = usual * np.exp(generator.normal(0, 0.2, len(triangles)))
-    spots[wetness > np.quantile(wetness, 1 - kind.wet)] *= WET
-    return Surface(triangles, kind.label, np.clip(spots, 0.003, 1))
+        mine = np.flatnonzero(kind == number)
+        if not len(mine):
+            continue
+        # Uneven in reflectivity from spot to spot, and dark where it is wet.
+        usual = log_uniform(each.reflectivity, generator)
+        spots = usual * np.exp(generator.normal(0, 0.2, len(mine)))
+        wettest = np.quantile(wetness[mine], 1 - each.wet)
+        spots[wetness[mine] > wettest] *= WET
+        yield Surface(triangles[mine], each.label, np.clip(spots, 0.003, 1))
 
 
 def _rings() -> Floats:

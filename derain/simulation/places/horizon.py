@@ -37,8 +37,7 @@ def lay_out_horizon(generator: Generator) -> Iterator[Surface]:
     Yields:
         Surfaces in the frame of a track, all of them at least 40 m from its origin: rough, hilly
         ground from 118 m on, and on it and nearer rows of trees full of gaps, single trees, corners
-        of buildings, poles, masts, signs, cables, lorries
-        and small things that glint.
+        of buildings, poles, masts, signs, cables, lorries and small things that glint.
     """
     yield _hills(generator)
     kinds: list[tuple[Callable[[float, Generator], Iterator[Surface]], int]] = [

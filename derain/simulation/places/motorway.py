@@ -76,9 +76,8 @@ def _breakdown(right: float, generator: Generator) -> Iterator[Surface]:
     def on_the_shoulder(x: float, y: float) -> bool:
         return right - 2.5 < y < right + 2.3 and x < 60
 
-    makes = [road_users.person] * generator.integers(2, 8) + [
-        openwork.bollard
-    ] * generator.integers(0, 8)
+    makes: list[Make] = [road_users.person] * int(generator.integers(2, 8))
+    makes += [openwork.bollard] * int(generator.integers(0, 8))
     places = placing.free_places(len(makes), (2.3, 60), 1.2, generator, on_the_shoulder)
     yield from placing.scatter(makes, places, generator)
 
@@ -93,9 +92,8 @@ def _beside(edges: tuple[float, float], generator: Generator) -> Iterator[Surfac
             litter = ground.rubble(generator.uniform(0.3, 1), generator)
             yield from placing.place(litter, x, y + side * generator.uniform(-1.5, 0.5))
         for x in along(*MOTORWAY_SIGHT, (4, 25), generator):
-            yield from placing.place(
-                openwork.thin_pole(generator), x, y + side * generator.uniform(0.8, 3)
-            )
+            pole = openwork.thin_pole(generator)
+            yield from placing.place(pole, x, y + side * generator.uniform(0.8, 3))
 
 
 def _gantries(edges: tuple[float, float], generator: Generator) -> Iterator[Surface]:

@@ -163,8 +163,8 @@ def wire_fence(length: float, generator: Generator) -> Iterator[Surface]:
     """A fence of a few level wires along x, barbed or not, with its posts."""
     height = generator.uniform(0.8, 1.5)
     for z in np.linspace(height / generator.integers(2, 7), height, generator.integers(2, 7)):
-        starts, ends = np.array([[0, 0, z]]), np.array([[length, 0, z]])
-        yield cable(starts[0], ends[0], 0.003 * length, (0.003, 0.012), generator)
+        start, end = np.array([0, 0, z]), np.array([length, 0, z])
+        yield cable(start, end, 0.003 * length, (0.003, 0.012), generator)
     yield from posts(length, height + 0.1, generator)
 
 

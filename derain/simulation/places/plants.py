@@ -156,10 +156,8 @@ def _boughs(height: float, generations: int, generator: Generator) -> Triangles:
         starts, ends = at, at + reach[:, None] * direction
         ends[:, 2] = np.maximum(ends[:, 2], 0.3)
         radius = max(0.5 * radius, 0.004)
-        thin = generation >= 3
-        wood.append(
-            shapes.blades(starts, ends, 2.5 * radius, generator)
-            if thin
-            else shapes.rods(starts, ends, radius, taper=0.5)
-        )
+        if generation < 3:
+            wood.append(shapes.rods(starts, ends, radius, taper=0.5))
+        else:
+            wood.append(shapes.blades(starts, ends, 2.5 * radius, generator))
     return np.concatenate(wood)

@@ -10,7 +10,7 @@ from derain.simulation import shapes
 from derain.simulation.arrays import Bools
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import log_uniform
-from derain.simulation.objects import Make, Options, Surface, mirrored, of_size
+from derain.simulation.objects import Options, Surface, mirrored, of_size
 from derain.simulation.places import openwork, placing, plants, road_users
 from derain.simulation.places.openwork import made, railing
 from derain.simulation.places.walls import Walls, shell
@@ -50,9 +50,8 @@ def lay_out_room(generator: Generator) -> Track:
     cleared = [surface for surface in map(_cleared, standing) if len(surface.triangles)]
     cleared = [part for surface in cleared for part in _polished(surface, generator)]
     heading = generator.uniform(-np.pi, np.pi)
-    return Track.of(
-        surface.placed(0, 0, heading) for surface in [*shell(room, generator), *cleared]
-    )
+    surfaces = [*shell(room, generator), *cleared]
+    return Track.of(surface.placed(0, 0, heading) for surface in surfaces)
 
 
 def _cleared(surface: Surface) -> Surface:
@@ -148,12 +147,10 @@ def _along_a_corridor(room: Walls, generator: Generator) -> Iterator[Surface]:
         handle = shapes.box(0.12, 0.03, 1.0, 1.03, at=(0.8, 0.06))
         x, y, heading = (at, side, 0.0) if lengthwise else (side, at, np.pi / 2)
         yield from placing.place(made([door, handle], generator), x, y, heading)
-    makes: list[Make] = [chair, rubbish, pot_plant, shelf]
-    count = int(generator.integers(0, 8))
-    chosen = placing.choose([(make, 1) for make in makes], count, generator)
-    yield from placing.scatter(
-        chosen, placing.free_places(count, (0.8, 20), 1, generator, room.holds), generator
-    )
+    options: Options = [(chair, 1), (rubbish, 1), (pot_plant, 1), (shelf, 1)]
+    chosen = placing.choose(options, (0, 8), generator)
+    places = placing.free_places(len(chosen), (0.8, 20), 1, generator, room.holds)
+    yield from placing.scatter(chosen, places, generator)
 
 
 def _stairs(room: Walls, generator: Generator) -> Iterator[Surface]:
@@ -169,8 +166,8 @@ def _stairs(room: Walls, generator: Generator) -> Iterator[Surface]:
         rail = railing(12 * tread, generator)
         parts = [made(steps, generator)]
         for y in (-width / 2, width / 2):
-            sloped = shapes.sloped(rail.moved(0, y, 0).triangles, rise / tread, 0)
-            parts.append(replace(rail, triangles=shapes.raised(sloped, level + rise)))
+            rising = rail.moved(0, y, 0).sloped(rise / tread, 0)
+            parts.append(rising.moved(0, 0, level + rise))
         turned = -6 * tread if heading else 0.8
         yield from placing.place(parts, turned * np.cos(heading), 0.6 * np.sign(heading), heading)
 

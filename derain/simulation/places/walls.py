@@ -137,9 +137,8 @@ class Walls:
         """Draws walls by the spans of the length of the shorter side and of the longer one."""
         sides = [log_uniform(span, generator) for span in (shortest, longest)]
         along, across = (sides[which] for which in generator.permutation(2))
-        behind, right = (
-            np.clip(generator.uniform(0, side), 0.7, side - 0.7) for side in (along, across)
-        )
+        behind = np.clip(generator.uniform(0, along), 0.7, along - 0.7)
+        right = np.clip(generator.uniform(0, across), 0.7, across - 0.7)
         return cls(
             (-float(behind), float(along - behind)),
             (-float(right), float(across - right)),

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.random import Generator
 
-from derain.simulation.arrays import Floats, Ints
 from derain.simulation.objects import Piece, Surface, of_size
 from derain.simulation.places import ground, openwork, placing, plants, walls
 from derain.simulation.track import Track
@@ -27,20 +26,15 @@ def lay_out_yard(generator: Generator) -> Track:
         *placing.ragged_things(generator, count=(25, 60), leafy=not winter),
     ]
     uneven = ground.Relief.draw(generator.uniform(0.05, 0.4), generator)
-    return placing.assemble(
-        _ground(winter, generator), standing, uneven, generator, _cables(generator)
-    )
+    floor, over = _ground(winter, generator), _cables(generator)
+    return placing.assemble(floor, standing, uneven, generator, over)
 
 
 def _ground(winter: bool, generator: Generator) -> Iterator[Surface]:
     kinds = [ground.GRAVEL, ground.TRACK, ground.SNOW if winter else ground.MEADOW, ground.FIELD]
     chosen = [kinds[which] for which in generator.permutation(len(kinds))[:2]]
     patches = ground.Relief.draw(1, generator)
-
-    def kind_at(x: Floats, y: Floats) -> Ints:
-        return (patches(x, y) > 0).astype(np.int64)
-
-    yield from ground.ground_mesh(chosen, kind_at, generator)
+    return ground.ground_mesh(chosen, lambda x, y: (patches(x, y) > 0).astype(np.int64), generator)
 
 
 def _heaps(winter: bool, generator: Generator) -> Iterator[Surface]:
