@@ -79,7 +79,7 @@ def _read_bag(path: Path) -> None:
     for frame in frames:
         scan = frame.read()
         assert scan.xyz.shape == (len(scan), 3), scan.xyz.shape
-    clouds = clouds_at(path)
+    clouds, _ = clouds_at(path)
     with tempfile.TemporaryDirectory() as folder:
         with BagCopy(clouds.bag, clouds.topic, Path(folder)) as copy:
             made = copy.finish()

@@ -7,7 +7,7 @@ together.
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import repeat
 from pathlib import Path
 from typing import Any, Literal, Self
@@ -58,7 +58,7 @@ class TaughtScan:
         scan: Its file.
         sequence: Name of its sequence.
         number: Its number in the sequence, from 0.
-        part: True if it is for training or held out.
+        part: Whether it is for training or held out.
     """
 
     key: str
@@ -84,7 +84,7 @@ class Manifest:
     scans: Sequence[TaughtScan] = ()
     columns: tuple[str, ...] = DEFAULT_COLUMNS
     intensity_scale: float = 1.0
-    finished: bool = field(default=True)
+    finished: bool = True
 
     @classmethod
     def read(cls, root: Path) -> Self:
@@ -106,7 +106,7 @@ class Manifest:
             {
                 "made_by": Entry.text,
                 "derain": Entry.text,
-                "teacher": lambda item: {key: part.value for key, part in item.members().items()},
+                "teacher": lambda item: item.each(lambda part: part.value),
                 "columns": Entry.texts,
                 "intensity_scale": lambda item: item.within(1 / LARGEST_SCALE, LARGEST_SCALE),
                 "finished": Entry.truth,
@@ -148,7 +148,7 @@ class Manifest:
         """The scans of a part, in order, each with its taught labels."""
         folders = {scan.scan.parent for scan in self.scans}
         records = {folder: Records(folder) for folder in folders}
-        clouds = {folder: clouds_at(folder) for folder in folders if split(folder) is not None}
+        clouds = {folder: clouds_at(folder)[0] for folder in folders if split(folder) is not None}
 
         def frame_of(scan: TaughtScan) -> FileFrame:
             folder = scan.scan.parent
@@ -225,12 +225,9 @@ def _relative_path(home: Path, scan: Path) -> str:
 
 
 def _scan_of(entry: Entry, home: Path) -> TaughtScan:
-    def place(item: Entry) -> Path:
-        return Path(os.path.normpath(home / item.text()))
-
     fields = {
         "key": _key,
-        "scan": place,
+        "scan": lambda item: Path(os.path.normpath(home / item.text())),
         "sequence": Entry.text,
         "number": lambda item: item.whole(0, HIGHEST_NUMBER),
         "part": lambda item: item.one_of(TAUGHT_PARTS),

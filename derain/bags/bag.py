@@ -199,13 +199,19 @@ class Bag:
             if stored is not None and number != stored:
                 raise ValueError(f"its topics have {number:,} of {stored:,} messages")
 
+    def wrong_index(self, reason: str) -> InputError:
+        """The error of a bag whose index has more or fewer messages than the bag."""
+        return InputError(
+            self.path, reason, "Rebuild its index by `ros2 bag reindex` or `rosbag reindex`."
+        )
+
     def _reader(self, path: Path, metadata: Ros2Metadata | None) -> Any:
         if self.storage != "mcap":
             return rosbags_reader(path, self.is_ros1)
         MCAP.load(self.path)
-        from derain.bags.mcap_reader import McapReader
+        from derain.bags.mcap_reader import mcap_reader
 
-        return McapReader([path / name for name in _names_of_files(metadata)])
+        return mcap_reader([path / name for name in _names_of_files(metadata)])
 
     @property
     def _rescuer(self) -> str:

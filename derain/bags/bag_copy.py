@@ -32,12 +32,11 @@ class BagCopy:
         self.topic = topic
         self._stack = ExitStack()
         reader = self._stack.enter_context(bag.opened())
-        with self._writing():
-            self._writer = _writer(bag, reader, folder / written_name(bag))
         self._messages = bag.messages_of(reader)
         self._clouds = 0
-        for connection in reader.connections:  # as many, and in the same order
-            with self._writing():
+        with self._writing():
+            self._writer = _writer(bag, reader, folder / written_name(bag))
+            for connection in reader.connections:  # as many, and in the same order
                 self._writer.connection(connection)
 
     @property
@@ -64,10 +63,8 @@ class BagCopy:
                 if self._clouds > number:
                     return message
             self.write(message)
-        raise InputError(
-            self.bag.path,
-            f"has {self._clouds:,} messages of {self.topic.name}, fewer than its index has",
-            "Rebuild its index by `ros2 bag reindex` or `rosbag reindex`.",
+        raise self.bag.wrong_index(
+            f"has {self._clouds:,} messages of {self.topic.name}, fewer than its index has"
         )
 
     def write(self, message: Message, data: bytes | None = None, topic: str | None = None) -> None:
@@ -99,11 +96,9 @@ class BagCopy:
             self._clouds += self.topic.has(message.connection)
             self.write(message)
         if self._clouds > self.topic.messages:
-            raise InputError(
-                self.bag.path,
+            raise self.bag.wrong_index(
                 f"has {self._clouds:,} messages of {self.topic.name}, more than its index has, "
-                "so the last ones were not cleaned",
-                "Rebuild its index by `ros2 bag reindex` or `rosbag reindex`.",
+                "so the last ones were not cleaned"
             )
         with self._writing():
             self._writer.close()

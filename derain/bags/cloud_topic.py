@@ -147,10 +147,8 @@ class CloudTopic:
         return number
 
     def _too_few(self) -> InputError:
-        return InputError(
-            self.bag.path,
-            f"has fewer messages of {self.topic.name} than the {len(self):,} of its index",
-            "Rebuild its index by `ros2 bag reindex` or `rosbag reindex`.",
+        return self.bag.wrong_index(
+            f"has fewer messages of {self.topic.name} than the {len(self):,} of its index"
         )
 
     def _warn_of_other_fields(self, number: int, fields: tuple[PointField, ...]) -> None:

@@ -4,10 +4,10 @@ import heapq
 from array import array
 from collections import Counter
 from collections.abc import Collection, Container, Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple, Self
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 from mcap.opcode import Opcode
@@ -258,19 +258,15 @@ class McapFile:
         return all(number in channels for number in self.channels)
 
 
+@dataclass(frozen=True, eq=False)
 class McapReader:
-    """The files of a bag in MCAP, open inside a ``with`` block.
-
-    Args:
-        paths: Its files, in the order of time.
+    """The files of a bag in MCAP.
 
     Attributes:
-        files: The same, open.
+        files: The files, open, in the order of time.
     """
 
-    def __init__(self, paths: Sequence[Path]) -> None:
-        self.files: list[McapFile] = []
-        self._paths = paths
+    files: Sequence[McapFile]
 
     @property
     def connections(self) -> list[McapConnection]:
@@ -347,15 +343,21 @@ class McapReader:
                 if kind in (Opcode.ATTACHMENT, Opcode.METADATA):
                     yield file.records.read(offset, kind)
 
-    def __enter__(self) -> Self:
-        with ExitStack() as stack:
-            opened = [stack.enter_context(path.open("rb")) for path in self._paths]
-            self.files = [McapFile(file) for file in opened]
-            self._stack = stack.pop_all()
-        return self
 
-    def __exit__(self, *_: object) -> None:
-        self._stack.close()
+@contextmanager
+def mcap_reader(paths: Sequence[Path]) -> Iterator[McapReader]:
+    """Lends a reader of the files of a bag, open.
+
+    Args:
+        paths: Its files, in the order of time.
+
+    Raises:
+        ValueError: A damaged file.
+        OSError: One cannot be read.
+    """
+    with ExitStack() as stack:
+        opened = [stack.enter_context(path.open("rb")) for path in paths]
+        yield McapReader([McapFile(file) for file in opened])
 
 
 def _place_of(

@@ -11,7 +11,7 @@ import os
 import struct
 from collections.abc import Callable, Iterable, Iterator
 from io import BytesIO
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO
 from zlib import crc32
 
 from mcap import records
@@ -46,18 +46,8 @@ CHECKSUM = struct.Struct("<I")
 FOOTER_SIZE = 20
 
 
-class Place(NamedTuple):
-    """The place of a record.
-
-    Attributes:
-        kind: Its kind.
-        offset: Of its first byte.
-        size: Bytes after its head.
-    """
-
-    kind: int
-    offset: int
-    size: int
+# The place of a record: its kind, the offset of its first byte, and the bytes after its head.
+Place = tuple[int, int, int]
 
 
 class McapRecords:
@@ -88,9 +78,9 @@ class McapRecords:
     def private(self) -> Iterator[bytes]:
         """Private records of the data and of the summary, with their heads."""
         for begin, end in (self.data, self.summary):
-            for place in _places(self._file, begin, end):
-                if place.kind not in SPECIFIED:
-                    yield self._bytes(place.offset, HEAD.size + place.size)
+            for kind, offset, size in _places(self._file, begin, end):
+                if kind not in SPECIFIED:
+                    yield self._bytes(offset, HEAD.size + size)
 
     def check_data(self, end: int) -> None:
         """Compares the checksum of the data with their bytes, where the file has one.
@@ -196,7 +186,7 @@ def _places(file: BinaryIO, begin: int, end: int) -> Iterator[Place]:
         kind, size = HEAD.unpack(head)
         if begin + HEAD.size + size > end:
             raise ValueError(f"a record of {size:,} bytes at byte {begin:,} is cut off")
-        yield Place(kind, begin, size)
+        yield kind, begin, size
         begin += HEAD.size + size
 
 

@@ -44,6 +44,7 @@ class McapWriter:
     def __init__(self, bag: McapReader, metadata: Ros2Metadata | None, path: Path) -> None:
         self.bag = bag
         self.metadata = metadata
+        self._compression = NONE if metadata is None else metadata.compression
         self.path = path
         path.mkdir(parents=True)
         self._file = (path / f"{path.name}.mcap").open("xb")
@@ -111,10 +112,6 @@ class McapWriter:
     def abort(self) -> None:
         """Closes the bag, which stays incomplete."""
         self._file.close()
-
-    @property
-    def _compression(self) -> str:
-        return NONE if self.metadata is None else self.metadata.compression
 
     def _metadata(self) -> Ros2Metadata:
         """The metadata of the new bag: that of the other, with what differs."""

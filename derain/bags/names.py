@@ -69,6 +69,11 @@ def is_bag(path: Path) -> bool:
         return METADATA_WORD in file.read(2**12)
 
 
+def files_of(bag: Path) -> list[Path]:
+    """The files of a bag: itself, or those in its folder, sorted."""
+    return sorted(filter(Path.is_file, bag.iterdir())) if bag.is_dir() else [bag]
+
+
 def split(path: Path) -> tuple[Path, str] | None:
     """Splits a path into a bag and the topic or cloud in it.
 

@@ -326,13 +326,8 @@ def parsed_yaml(text: str, largest: int = LARGEST_DOCUMENT, aliases: bool = Fals
     """
     if len(text) > largest:
         raise ValueError(f"more than {largest:,} characters")
-    _refuse_expanding_aliases(text, largest // BYTES_PER_VALUE, aliases)
-    return yaml.load(text, _Loader)
-
-
-def _refuse_expanding_aliases(text: str, most: int, aliases: bool) -> None:
-    """Refuses a text whose values would take far more memory than it, before any are made."""
-    depth = 0
+    # Before any values are made, which may take far more memory than the text.
+    depth, most = 0, largest // BYTES_PER_VALUE
     for number, event in enumerate(yaml.parse(text, _Loader)):
         if number > most:
             raise ValueError(f"more than {most:,} values")
@@ -342,6 +337,7 @@ def _refuse_expanding_aliases(text: str, most: int, aliases: bool) -> None:
         depth -= isinstance(event, yaml.CollectionEndEvent)
         if depth > DEEPEST:
             raise ValueError(f"nested more than {DEEPEST} deep")
+    return yaml.load(text, _Loader)
 
 
 def packaged(package: str, folder: str = "") -> dict[str, Path]:

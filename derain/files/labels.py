@@ -22,9 +22,9 @@ LABEL = ".label"
 def label_beside(scan: Path) -> Path:
     """Path of a scan's labels: beside it if they are there, else in the sibling `labels`."""
     label = beside(scan, LABEL)
-    # Not Path.is_file, which raises where the name has become too long by its suffix.
     # The folder above the scan's, also where the scan is named from within its own.
     sequence = scan.absolute().parent.parent
+    # Not Path.is_file, which raises where the name has become too long by its suffix.
     return label if os.path.isfile(label) else sequence / "labels" / label.name
 
 
@@ -41,15 +41,14 @@ def read_labels(path: Path, points: int) -> NDArray[np.uint32]:
     Raises:
         InputError: A file that cannot be read, or that does not hold one label per point.
     """
-    with reading(path):
-        size = file_size(path)
-    if size != 4 * points:
-        raise InputError(
-            path,
-            f"holds {size / 4:g} labels of 4 bytes for a scan of {points} points",
-            "Give the label file that belongs to the scan, and all of the scan's --columns.",
-        )
     with reading(path, ValueError):
+        size = file_size(path)
+        if size != 4 * points:
+            raise InputError(
+                path,
+                f"holds {size / 4:g} labels of 4 bytes for a scan of {points} points",
+                "Give the label file that belongs to the scan, and all of the scan's --columns.",
+            )
         return np.frombuffer(read_bytes(path, size), "<u4", points).astype(np.uint32)
 
 

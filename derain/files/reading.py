@@ -23,10 +23,7 @@ def reading(path: Path, *damage: type[Exception]) -> Iterator[None]:
     """
     try:
         yield
-    except (
-        InputError,
-        BrokenPipeError,
-    ):  # the pipe that the block prints to, not the file
+    except (InputError, BrokenPipeError):  # the pipe that the block prints to, not the file
         raise
     except damage as error:
         reason = " ".join(str(error).split())

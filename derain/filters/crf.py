@@ -11,13 +11,7 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.filters.airborne import Around, fit_rain_bounds
 from derain.filters.ground import find_ground
-from derain.filters.point_filter import (
-    FILTERS,
-    PointFilter,
-    RainAndPoints,
-    Span,
-    filter_view,
-)
+from derain.filters.point_filter import FILTERS, PointFilter, RainAndPoints, Span, filter_view
 from derain.filters.random_field import decide_sequentially
 from derain.scan import Scan
 from derain.system.stopwatch import Stopwatch

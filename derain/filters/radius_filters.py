@@ -14,13 +14,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.filters.point_filter import (
-    FILTERS,
-    TUNED_NEIGHBOURS,
-    PointFilter,
-    RainAndPoints,
-    Span,
-)
+from derain.filters.point_filter import FILTERS, TUNED_NEIGHBOURS, PointFilter, RainAndPoints, Span
 from derain.scan import Scan
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
@@ -63,8 +57,7 @@ class RadiusFilter(PointFilter):
         if view.size < self.neighbours:
             return np.ones(view.size, bool)  # the view's k-th nearest is then a stand-in
         last = view.distances[:, self.neighbours - 1]
-        lonely: NDArray[np.bool_] = last > self.radius_at(view.points)
-        return lonely
+        return last > self.radius_at(view.points)
 
     def judge_scan(
         self, scan: Scan, threads: int, candidates: Candidates | None, stopwatch: Stopwatch
@@ -170,14 +163,10 @@ class DROR(RadiusFilter):
     def radius_at(self, points: NDArray[np.float32]) -> NDArray[np.float64]:
         """The radius around each point; see :class:`RadiusFilter`."""
         x, y = points[:, :2].T.astype(np.float64)
-        radius: NDArray[np.float64] = self._radius_per_metre * np.sqrt(x * x + y * y)
-        return np.maximum(radius, self.minimum_radius)
-
-    @property
-    def _radius_per_metre(self) -> float:
         angle = math.radians(self.azimuth_resolution)
         spacing = 2 * math.sin(angle) if self.variant == "code" else angle
-        return self.radius_multiplier * spacing
+        radius: NDArray[np.float64] = self.radius_multiplier * spacing * np.sqrt(x * x + y * y)
+        return np.maximum(radius, self.minimum_radius)
 
 
 def has_few_neighbours(

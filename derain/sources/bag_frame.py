@@ -8,7 +8,7 @@ from pathlib import Path
 
 from derain.bags.bag import Bag
 from derain.bags.cloud_topic import CloudTopic, damaged_cloud
-from derain.bags.names import split, stem
+from derain.bags.names import files_of, split, stem
 from derain.bags.point_cloud import scan_of_cloud
 from derain.errors import InputError
 from derain.files.labels import LABEL
@@ -76,18 +76,15 @@ class BagFrame(FileFrame):
 
     def size(self) -> int:
         """Bytes of its share of the bag."""
-        with reading(self.clouds.bag.path):
-            return sum(map(file_size, self._files())) // max(len(self.clouds), 1)
+        bag = self.clouds.bag.path
+        with reading(bag):
+            return sum(map(file_size, files_of(bag))) // max(len(self.clouds), 1)
 
     def stamp(self) -> str:
         """Size and time of change of the files of its bag and its labels; its place in the bag."""
         place = [self.clouds.topic.name, str(self.cloud_number)]
-        return " ".join([*map(stamp_of, self._files()), *place]) + self._label_stamp()
-
-    def _files(self) -> list[Path]:
-        """The files of its bag."""
-        bag = self.clouds.bag.path
-        return sorted(filter(Path.is_file, bag.iterdir())) if bag.is_dir() else [bag]
+        stamps = map(stamp_of, files_of(self.clouds.bag.path))
+        return " ".join([*stamps, *place]) + self._label_stamp()
 
     def _checksum(self) -> str:
         return sha256(self.clouds.message(self.cloud_number).data).hexdigest()
@@ -106,7 +103,7 @@ def bag_frames(path: Path, labelled: bool = False, prefix: str = "") -> list[Bag
         InputError: A path that leads into no bag; a bag that cannot be read; no such topic or
             cloud; several topics of clouds, and none is named.
     """
-    clouds, number = _clouds_at(path)
+    clouds, number = clouds_at(path)
     numbers = range(len(clouds)) if number is None else [number]
     if not len(clouds) or numbers[-1] >= len(clouds):
         raise InputError(
@@ -138,21 +135,19 @@ def bag_frame(clouds: CloudTopic, number: int, key: str) -> BagFrame:
     return replace(frame, label_path=frame.label_beside_bag)
 
 
-def clouds_at(path: Path) -> CloudTopic:
-    """The clouds of a topic in a bag.
+def clouds_at(path: Path) -> tuple[CloudTopic, int | None]:
+    """The clouds of a topic in a bag, and the number of the one that a path names.
 
     Args:
         path: The topic, or one of its clouds, as if the bag were a folder; or the bag, if it has
             only one topic of clouds.
 
+    Returns:
+        The clouds; and the number, from 0, or None where the path names all of them.
+
     Raises:
         InputError: As for :func:`bag_frames`.
     """
-    return _clouds_at(path)[0]
-
-
-def _clouds_at(path: Path) -> tuple[CloudTopic, int | None]:
-    """The clouds at a path, and the number of the one that it names."""
     found = split(path)
     if found is None:
         raise InputError(path, "there is no such file or folder", "Check the path.")

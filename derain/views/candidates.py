@@ -97,14 +97,10 @@ def narrower(some: Iterable[Bound], others: Iterable[Bound]) -> tuple[Bound, ...
     by_channel = {bound.channel: bound for bound in some}
     for other in others:
         bound = by_channel.get(other.channel, other)
-        limits = {
-            "least": [limit for limit in (bound.least, other.least) if limit is not None],
-            "most": [limit for limit in (bound.most, other.most) if limit is not None],
-        }
+        least = [limit for limit in (bound.least, other.least) if limit is not None]
+        most = [limit for limit in (bound.most, other.most) if limit is not None]
         by_channel[other.channel] = Bound(
-            other.channel,
-            max(limits["least"], default=None),
-            min(limits["most"], default=None),
+            other.channel, max(least, default=None), min(most, default=None)
         )
     return tuple(by_channel.values())
 

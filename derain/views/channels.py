@@ -52,11 +52,9 @@ def channel_values(
     Returns:
         float32 (C, M), each channel in its own unit; NaN for values that the scan lacks.
     """
-    values = np.full((len(channels), len(rows)), np.nan, np.float32)
+    values = np.empty((len(channels), len(rows)), np.float32)
     for of_channel, name in zip(values, channels, strict=True):
-        column = scan.channel(name)
-        if column is not None:
-            of_channel[:] = column[rows]
+        of_channel[:] = _column(scan, name)[rows]
     return values
 
 
@@ -79,8 +77,7 @@ def filled_values(
     """
     of_all = np.empty((len(scan), len(channels)), np.float32)
     for number, name in enumerate(channels):
-        column = scan.channel(name)
-        of_all[:, number] = np.nan if column is None else column
+        of_all[:, number] = _column(scan, name)
     # All of a point at once: four times faster than channel by channel.
     values = of_all.take(rows, axis=0)
     for of_channel, name in zip(values.T, channels, strict=True):
@@ -107,10 +104,13 @@ def channel_image(
     """
     image = np.empty((len(channels), len(winner)), np.float32)
     for of_channel, name in zip(image, channels, strict=True):
-        column = scan.channel(name)
-        if column is None:
-            column = np.full(len(scan), np.nan, np.float32)
         # The last value is what row -1 has, so that no pass over the empty pixels is needed.
-        of_channel[:] = np.append(column, np.float32(0))[winner]
+        of_channel[:] = np.append(_column(scan, name), np.float32(0))[winner]
         of_channel[np.isnan(of_channel)] = fill_value.get(name, 0.0)
     return image
+
+
+def _column(scan: Scan, name: str) -> NDArray[np.float32]:
+    """A channel of all rows, float32 (N,); NaN where the scan lacks it."""
+    column = scan.channel(name)
+    return np.full(len(scan), np.nan, np.float32) if column is None else column

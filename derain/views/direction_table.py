@@ -107,8 +107,7 @@ def height_of(z: NDArray[Any], distance: NDArray[Any] | float) -> NDArray[Any]:
 
 def _inclination(height: NDArray[Any]) -> NDArray[np.float64]:
     """Inclination of a height, degrees."""
-    inclination: NDArray[np.float64] = np.degrees(np.arcsin(height / (BINS // 2) - 1))
-    return inclination
+    return np.degrees(np.arcsin(height / (BINS // 2) - 1))
 
 
 def turn_of(x: NDArray[Any], y: NDArray[Any]) -> NDArray[Any]:

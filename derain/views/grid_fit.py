@@ -113,8 +113,7 @@ def _thin_slabs(azimuth: Extent, inclination: Extent, returns: float) -> list[fl
     """
     (right, left), (bottom, top) = azimuth, inclination
     thickness = math.sqrt((left - right) * (top - bottom) / returns) / 2
-    borders: list[float] = np.arange(bottom, top, max(thickness, FINEST_STEP)).tolist()
-    return borders
+    return np.arange(bottom, top, max(thickness, FINEST_STEP)).tolist()
 
 
 def _columns(azimuth: Extent, step: float) -> tuple[int, Extent]:

@@ -5,9 +5,8 @@ along a Morton curve, before any search; a network judges the others alone, and 
 takes its time for.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -19,9 +18,8 @@ from derain.views.intensity_rank import INTENSITY_RANKS, edges_reached, intensit
 from derain.views.merged_points import are_one_return, merged_points
 from derain.views.morton import distinct_rows
 from derain.views.neighbour_search import NeighbourSearch
-from derain.views.neighbours import MOST_NETWORK_NEIGHBOURS, of_points_to_rows
-from derain.views.spherical_grid import ALL_AROUND
-from derain.views.view import VIEWS, BackProjection, View, ViewedScan
+from derain.views.neighbours import ViewedPoints, neighbours_at
+from derain.views.view import VIEWS, View
 
 # A point is isolated if no more than this crowds it, see :func:`crowding`. A quarter of a scan is,
 # and 97.5 % of the rain and snow in simulated worlds.
@@ -58,7 +56,7 @@ SHELL_MIDDLES = np.sqrt(_ALL_EDGES[1:] * _ALL_EDGES[:-1])
 
 
 @dataclass(frozen=True, eq=False)
-class IsolatedPoints(ViewedScan):
+class IsolatedPoints(ViewedPoints):
     """One or more scans as a network sees them that judges isolated points alone.
 
     The M points are the distinct returns of the scan, along a Morton curve: of several rows at one
@@ -79,14 +77,9 @@ class IsolatedPoints(ViewedScan):
         inverse: Point of each row of the scan, int64 (N,); -1 for invalid rows.
     """
 
-    points: NDArray[np.float32]
     cell: NDArray[np.int64]
-    neighbours: NDArray[np.int64]
-    distances: NDArray[np.float32]
     step: NDArray[np.float32]
     counts: NDArray[np.float32]
-    first: NDArray[np.int64]
-    inverse: NDArray[np.int64]
 
     @property
     def varying(self) -> Mapping[str, str]:
@@ -99,44 +92,10 @@ class IsolatedPoints(ViewedScan):
         """S, the number of isolated points."""
         return len(self.neighbours)
 
-    @property
-    def judged(self) -> NDArray[np.bool_]:
-        """True for valid rows of the scan, bool (N,); not rain where they are crowded."""
-        return self.inverse >= 0
-
     def inputs(self) -> dict[str, NDArray[Any]]:
         """The network's inputs, in its order."""
         names = ("points", "cell", "distances", "neighbours", "step", "counts")
         return {name: getattr(self, name) for name in names}
-
-    def target(self, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """Training target of each isolated point.
-
-        Args:
-            rain: Truth for every row of the scan, bool (N,).
-
-        Returns:
-            1 for rain, 0 for everything else, int64 (S,).
-        """
-        return rain[self.first[self._isolated]].astype(np.int64)
-
-    def back_projection(self) -> BackProjection:
-        """Back-projection: gives every row the score of its point, and 0 if that is crowded."""
-        return partial(of_points_to_rows, self.inverse, self._isolated, len(self.points))
-
-    @staticmethod
-    def pack(seen: Sequence["IsolatedPoints"]) -> dict[str, NDArray[Any]]:
-        """Inputs of several scans as one cloud, each scan's neighbours staying its own."""
-        inputs = [one.inputs() for one in seen]
-        before = np.cumsum([0, *(len(one["points"]) for one in inputs)])
-        for one, points in zip(inputs, before, strict=False):
-            one["neighbours"] = one["neighbours"] + points
-        return {name: np.concatenate([one[name] for one in inputs]) for name in inputs[0]}
-
-    @property
-    def _isolated(self) -> NDArray[np.int64]:
-        """Each isolated point as a row of ``points``, int64 (S,)."""
-        return self.neighbours[:, 0]
 
 
 @VIEWS.add("isolated_points")
@@ -163,22 +122,14 @@ class IsolatedPointView(View):
         Raises:
             InputError: Something that does not describe it.
         """
-        found = entry.record(
-            {"kind": Entry.text, "neighbours": lambda e: e.whole(1, MOST_NETWORK_NEIGHBOURS)},
-            required=("neighbours",),
-        )
+        neighbours = neighbours_at(entry)
         if channels != CHANNELS:
             raise entry.fault(f"its channels are not {', '.join(CHANNELS)}", "Export it again.")
-        return cls(found["neighbours"], threads)
+        return cls(neighbours, threads)
 
     def as_dict(self) -> dict[str, Any]:
         """Its part of a Spec: ``kind`` and ``neighbours``."""
         return {"kind": self.NAME, "neighbours": self.neighbours}
-
-    @property
-    def azimuth(self) -> tuple[float, float]:
-        """Its field of view: everything around."""
-        return ALL_AROUND
 
     def __call__(self, scan: Scan) -> IsolatedPoints:
         """Views a scan."""
@@ -187,16 +138,9 @@ class IsolatedPointView(View):
         neighbours, distances = search(self.neighbours, isolated)
         cell = _cells(xyz, intensity_rank(scan)[first])
         counts = np.bincount(cell, minlength=SHELLS * INTENSITY_RANKS).astype(np.float32)
-        return IsolatedPoints(
-            xyz,
-            cell,
-            neighbours,
-            distances,
-            np.array([step], np.float32),
-            counts.reshape(1, SHELLS, INTENSITY_RANKS),
-            first,
-            inverse,
-        )
+        counts = counts.reshape(1, SHELLS, INTENSITY_RANKS)
+        steps = np.array([step], np.float32)
+        return IsolatedPoints(xyz, neighbours, distances, first, inverse, cell, steps, counts)
 
     def _returns(
         self, scan: Scan

@@ -65,10 +65,8 @@ class NeighbourSearch:
         rows, squared = np.ascontiguousarray(rows[:, :found]), squared[:, :found]
         if found < k:
             missing = ((0, 0), (0, k - found))
-            rows, squared = (
-                np.pad(rows, missing, mode="edge"),
-                np.pad(squared, missing, mode="edge"),
-            )
+            rows = np.pad(rows, missing, mode="edge")
+            squared = np.pad(squared, missing, mode="edge")
         return rows, np.sqrt(squared.astype(np.float32))
 
     def nearest(self, queries: NDArray[np.int64] | None, k: int) -> Found:

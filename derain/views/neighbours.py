@@ -14,7 +14,6 @@ from derain.views.candidates import Candidates
 from derain.views.channels import filled_values
 from derain.views.morton import distinct_rows
 from derain.views.neighbour_search import NeighbourSearch
-from derain.views.spherical_grid import ALL_AROUND
 from derain.views.view import VIEWS, BackProjection, View, ViewedScan
 
 # The most neighbours that a Spec may state, seven times as many as those of 3D-OutDet. A
@@ -23,7 +22,67 @@ MOST_NETWORK_NEIGHBOURS = 64
 
 
 @dataclass(frozen=True, eq=False)
-class Neighbourhoods(ViewedScan):
+class ViewedPoints(ViewedScan):
+    """One or more scans as a network sees them that judges some or all of their points.
+
+    Attributes:
+        points: Channels of M points, float32 (M, C).
+        neighbours: Of F points the point itself, then its nearest neighbours in ascending
+            distance, as rows of ``points``, int64 (F, k). Those that are scored come first.
+        distances: Their distances in metres, float32 (F, k).
+        first: Row of the scan that each point was taken from, int64 (M,).
+        inverse: Point of each row of the scan, int64 (N,); -1 for invalid rows.
+    """
+
+    points: NDArray[np.float32]
+    neighbours: NDArray[np.int64]
+    distances: NDArray[np.float32]
+    first: NDArray[np.int64]
+    inverse: NDArray[np.int64]
+
+    @property
+    def judged(self) -> NDArray[np.bool_]:
+        """True for rows of the scan at some point, bool (N,); not rain where it is not scored."""
+        return self.inverse >= 0
+
+    def target(self, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Training target of each point that is scored.
+
+        Args:
+            rain: Truth for every row of the scan, bool (N,).
+
+        Returns:
+            1 for rain, 0 for everything else, int64 (J,).
+        """
+        return rain[self.first[self._scored]].astype(np.int64)
+
+    def back_projection(self) -> BackProjection:
+        """Back-projection: gives every row the score of its point, and 0 if that has none."""
+        return partial(_to_rows, self.inverse, self._scored, len(self.points))
+
+    @staticmethod
+    def pack(seen: Sequence[ViewedScan]) -> dict[str, NDArray[Any]]:
+        """Inputs of several scans as one cloud, each scan's neighbours staying its own."""
+        inputs = [one.inputs() for one in seen]
+        # What an input counts by its numbers: rows of another input, scan after scan.
+        for name, of in (("neighbours", "points"), ("candidates", "neighbours")):
+            if name in inputs[0]:
+                before = np.cumsum([0, *(len(one[of]) for one in inputs)])
+                for one, rows in zip(inputs, before, strict=False):
+                    one[name] = one[name] + rows
+        return {name: np.concatenate([one[name] for one in inputs]) for name in inputs[0]}
+
+    @property
+    def _scored(self) -> NDArray[np.int64]:
+        """Each point that is scored as a row of ``points``, int64 (J,)."""
+        if self.size == len(self.points):
+            return np.arange(self.size)  # faster than to read them, each far from the next
+        # A copy, so that a back-projection does not keep all neighbours in memory.
+        return self.neighbours[: self.size, 0].copy()
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbourhoods(ViewedPoints):
     """One or more scans as a point network sees them.
 
     The M points are the distinct valid positions of the scan, along a Morton curve. Of several rows
@@ -44,18 +103,13 @@ class Neighbourhoods(ViewedScan):
             its own, as rows of ``neighbours``, int64 (J, k). None where all points are scored.
     """
 
-    points: NDArray[np.float32]
-    neighbours: NDArray[np.int64]
-    distances: NDArray[np.float32]
-    first: NDArray[np.int64]
-    inverse: NDArray[np.int64]
     candidates: NDArray[np.int64] | None = None
 
     @property
     def varying(self) -> Mapping[str, str]:
         """The inputs, each as long as the scan has points, neighbourhoods or candidates."""
         if self.candidates is None:
-            return dict.fromkeys(self.inputs(), "points")
+            return dict.fromkeys(("points", "distances", "neighbours"), "points")
         return {
             "points": "points",
             "distances": "neighbourhoods",
@@ -68,66 +122,9 @@ class Neighbourhoods(ViewedScan):
         """J, the number of points that the network scores."""
         return len(self.points if self.candidates is None else self.candidates)
 
-    @property
-    def judged(self) -> NDArray[np.bool_]:
-        """True for rows of the scan at some point, bool (N,); not rain where it is no candidate."""
-        return self.inverse >= 0
-
     def inputs(self) -> dict[str, NDArray[Any]]:
         """The network's inputs, in its order: points, distances, neighbours, and any candidates."""
-        inputs: dict[str, NDArray[Any]] = {
-            "points": self.points,
-            "distances": self.distances,
-            "neighbours": self.neighbours,
-        }
-        if self.candidates is not None:
-            inputs["candidates"] = self.candidates
-        return inputs
-
-    def target(self, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """Training target of each point that it scores.
-
-        Args:
-            rain: Truth for every row of the scan, bool (N,).
-
-        Returns:
-            1 for rain, 0 for everything else, int64 (J,).
-        """
-        first = self.first if self.candidates is None else self.first[self._of_candidates]
-        return rain[first].astype(np.int64)
-
-    def back_projection(self) -> BackProjection:
-        """Back-projection: gives every row the score of its point, and 0 if that has none."""
-        if self.candidates is None:
-            return partial(_to_rows, self.inverse)
-        return partial(of_points_to_rows, self.inverse, self._of_candidates, len(self.points))
-
-    @staticmethod
-    def pack(seen: Sequence["Neighbourhoods"]) -> dict[str, NDArray[Any]]:
-        """Inputs of several scans as one cloud, each scan's neighbours staying its own."""
-        inputs = [one.inputs() for one in seen]
-        # What an input counts by its numbers: rows of another input, scan after scan.
-        counted = {"neighbours": "points", "candidates": "neighbours"}
-        before = {
-            name: np.cumsum([0, *(len(one[of]) for one in inputs)])
-            for name, of in counted.items()
-            if name in inputs[0]
-        }
-        return {
-            name: np.concatenate(
-                [
-                    one[name] + before[name][number] if name in before else one[name]
-                    for number, one in enumerate(inputs)
-                ]
-            )
-            for name in inputs[0]
-        }
-
-    @property
-    def _of_candidates(self) -> NDArray[np.int64]:
-        """Each candidate as a row of ``points``, int64 (J,)."""
-        assert self.candidates is not None
-        return self.neighbours[: len(self.candidates), 0]
+        return {name: getattr(self, name) for name in self.varying}
 
 
 @VIEWS.add("neighbours")
@@ -158,20 +155,11 @@ class NeighbourView(View):
         Raises:
             InputError: Something that does not describe it.
         """
-        found = entry.record(
-            {"kind": Entry.text, "neighbours": lambda e: e.whole(1, MOST_NETWORK_NEIGHBOURS)},
-            required=("neighbours",),
-        )
-        return cls(found["neighbours"], channels, fill_value, threads)
+        return cls(neighbours_at(entry), channels, fill_value, threads)
 
     def as_dict(self) -> dict[str, Any]:
         """Its part of a Spec: ``kind`` and ``neighbours``."""
         return {"kind": self.NAME, "neighbours": self.neighbours}
-
-    @property
-    def azimuth(self) -> tuple[float, float]:
-        """Its field of view: everything around."""
-        return ALL_AROUND
 
     def with_candidates(self, candidates: Candidates) -> Self:
         """The same view, that scores candidates alone."""
@@ -188,6 +176,17 @@ class NeighbourView(View):
         candidate = self.candidates.among(scan)[first]
         neighbours, distances, candidates = _around(search, candidate, self.neighbours)
         return Neighbourhoods(points, neighbours, distances, first, inverse, candidates)
+
+
+def neighbours_at(entry: Entry) -> int:
+    """Reads the size of a neighbourhood from a Spec of a view, which has its ``kind`` besides.
+
+    Raises:
+        InputError: Something that does not describe it.
+    """
+    parsers = {"kind": Entry.text, "neighbours": lambda e: e.whole(1, MOST_NETWORK_NEIGHBOURS)}
+    neighbours: int = entry.record(parsers, required=("neighbours",))["neighbours"]
+    return neighbours
 
 
 def _around(
@@ -220,16 +219,9 @@ def _around(
     )
 
 
-def _to_rows(inverse: NDArray[np.int64], score: NDArray[np.float32]) -> NDArray[np.float32]:
-    result = np.zeros(len(inverse), np.float32)
-    judged = inverse >= 0
-    result[judged] = score[inverse[judged]]
-    return result
-
-
-def of_points_to_rows(
+def _to_rows(
     inverse: NDArray[np.int64],
-    candidates: NDArray[np.int64],
+    scored: NDArray[np.int64],
     points: int,
     score: NDArray[np.float32],
 ) -> NDArray[np.float32]:
@@ -237,7 +229,7 @@ def of_points_to_rows(
 
     Args:
         inverse: Point of each row, int64 (N,); -1 for rows at none.
-        candidates: The points that are scored, int64 (J,).
+        scored: The points that are scored, int64 (J,).
         points: M, the number of points.
         score: float32 (J,).
 
@@ -246,5 +238,5 @@ def of_points_to_rows(
     """
     # The last place is for rows at no point, whose number is -1.
     of_points = np.zeros(points + 1, np.float32)
-    of_points[candidates] = score
+    of_points[scored] = score
     return of_points.take(inverse)

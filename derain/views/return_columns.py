@@ -36,15 +36,12 @@ class StatedReturns:
             different numbers. -1 for the only return of a ray.
         nearer: True if a return of the same ray lies behind by the column, bool (N,).
         farther: True if a return of the same ray lies in front by the column, bool (N,).
-        other_range: Range of the other return if that has no row of its own, float32 (N,),
-            metres; NaN if it has one or there is none.
     """
 
     column: str
     number: NDArray[np.int64]
     nearer: NDArray[np.bool_]
     farther: NDArray[np.bool_]
-    other_range: NDArray[np.float32]
 
 
 def stated_returns(scan: Scan) -> StatedReturns | None:
@@ -105,13 +102,8 @@ def _from_numbers_and_counts(
     several = scan.valid & (count > 1) & (number >= 1) & (number <= count)
     if not several.any():
         return None
-    return StatedReturns(
-        name,
-        np.where(several, number, -1),
-        several & (number < count),
-        several & (number > 1),
-        _no_range(scan),
-    )
+    stated = np.where(several, number, -1)
+    return StatedReturns(name, stated, several & (number < count), several & (number > 1))
 
 
 def _from_types(scan: Scan, columns: Columns) -> StatedReturns | None:
@@ -127,7 +119,7 @@ def _from_types(scan: Scan, columns: Columns) -> StatedReturns | None:
         return None
     nearer, farther = scan.valid & np.isin(kind, front), scan.valid & np.isin(kind, behind)
     number = np.where(nearer, 1, np.where(farther, 2, -1))
-    return StatedReturns("return_type", number, nearer, farther, _no_range(scan))
+    return StatedReturns("return_type", number, nearer, farther)
 
 
 def _from_tags(scan: Scan, columns: Columns) -> StatedReturns | None:
@@ -150,8 +142,7 @@ def _from_second_ranges(scan: Scan, columns: Columns) -> StatedReturns | None:
     both &= other <= LARGEST_COORDINATE
     nearer = both & (other - scan.range >= LEAST_APART)
     farther = both & (scan.range - other >= LEAST_APART)
-    other_range = np.where(nearer | farther, other, np.nan).astype(np.float32)
-    return StatedReturns("range2", np.full(len(scan), -1), nearer, farther, other_range)
+    return StatedReturns("range2", np.full(len(scan), -1), nearer, farther)
 
 
 def _from_numbers_alone(scan: Scan, name: str, number: NDArray[np.int64]) -> StatedReturns | None:
@@ -163,7 +154,7 @@ def _from_numbers_alone(scan: Scan, name: str, number: NDArray[np.int64]) -> Sta
     if not len(numbers) or numbers.min() == numbers.max():
         return None
     farther = scan.valid & (number > numbers.min())
-    return StatedReturns(name, number, np.zeros(len(scan), bool), farther, _no_range(scan))
+    return StatedReturns(name, number, np.zeros(len(scan), bool), farther)
 
 
 def _whole(column: NDArray[Any]) -> NDArray[np.int64]:
@@ -171,10 +162,6 @@ def _whole(column: NDArray[Any]) -> NDArray[np.int64]:
     if column.dtype.kind != "f":
         return column.astype(np.int64)
     return np.where(np.abs(column) < 2**31, column, -1).astype(np.int64)
-
-
-def _no_range(scan: Scan) -> NDArray[np.float32]:
-    return np.full(len(scan), np.nan, np.float32)
 
 
 _READERS: tuple[Callable[[Scan, Columns], StatedReturns | None], ...] = (

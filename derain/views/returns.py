@@ -6,7 +6,6 @@ are snow, and 1 to 2 % of the farther ones (BENCHMARK.md, Settled choices).
 """
 
 from dataclasses import dataclass, replace
-from typing import Self
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -34,8 +33,6 @@ class RayReturns:
         farther: Another one lies in front of it, bool (N,).
         partner: Row of the next return behind it, or in front of the farthest one, int64 (N,); -1
             if there is none, or if it is not a row of the scan.
-        partner_range: Range of that return, even if it is not a row, float32 (N,), metres; NaN if
-            there is none or it is unknown.
         found_by: Name of the column that the returns come from, ``directions``, or empty if no ray
             is known to have two returns.
     """
@@ -43,15 +40,7 @@ class RayReturns:
     nearer: NDArray[np.bool_]
     farther: NDArray[np.bool_]
     partner: NDArray[np.int64]
-    partner_range: NDArray[np.float32]
     found_by: str
-
-    @classmethod
-    def single(cls, points: int) -> Self:
-        """The returns of a scan with one return per ray."""
-        none = np.zeros(points, bool)
-        nowhere = np.full(points, np.nan, np.float32)
-        return cls(none, none.copy(), np.full(points, -1), nowhere, "")
 
     @property
     def dual(self) -> bool:
@@ -106,8 +95,6 @@ def _pair(scan: Scan) -> RayReturns:
         if (outwards[apart] < 0).sum() > (outwards[apart] > 0).sum():
             stated = replace(stated, nearer=stated.farther, farther=stated.nearer)
     found = _returns_of_points(near[apart], far[apart], ranges)
-    if not found.dual and stated is None:
-        return RayReturns.single(len(scan))
     return _returns_of_rows(found, first, inverse, stated)
 
 
@@ -129,8 +116,7 @@ def _returns_of_points(
     partner[far[in_front]] = near[in_front]
     behind = np.argsort(-ranges[far], kind="stable")
     partner[near[behind]] = far[behind]
-    partner_range = np.where(partner >= 0, ranges[partner], np.float32(np.nan))
-    return RayReturns(nearer, farther, partner, partner_range, BY_DIRECTIONS if len(near) else "")
+    return RayReturns(nearer, farther, partner, BY_DIRECTIONS if len(near) else "")
 
 
 def _returns_of_rows(
@@ -153,11 +139,9 @@ def _returns_of_rows(
     )
     partner_of_first = np.where(found.partner >= 0, first[found.partner], -1)
     partner = np.append(partner_of_first, -1)[inverse]
-    partner_range = np.append(found.partner_range, np.float32(np.nan))[inverse]
     if stated is None:
-        return RayReturns(nearer, farther, partner, partner_range, BY_DIRECTIONS)
+        return RayReturns(nearer, farther, partner, found.found_by)
     alone = partner < 0
     nearer |= alone & stated.nearer
     farther |= alone & stated.farther
-    partner_range = np.where(alone, stated.other_range, partner_range)
-    return RayReturns(nearer, farther, partner, partner_range, stated.column)
+    return RayReturns(nearer, farther, partner, stated.column)

@@ -69,15 +69,11 @@ class SphericalGrid:
 
     def __post_init__(self) -> None:
         right, left = self.azimuth
+        size = f"{self.rows} rows by {self.columns} columns"
         if self.rows < 1 or self.columns < 1:
-            raise _wrong(
-                f"{self.rows} rows by {self.columns} columns", "Give at least one of each."
-            )
+            raise _wrong(size, "Give at least one of each.")
         if self.rows * self.columns > MOST_PIXELS:
-            raise _wrong(
-                f"{self.rows} rows by {self.columns} columns",
-                f"Give at most {MOST_PIXELS:,} pixels.",
-            )
+            raise _wrong(size, f"Give at most {MOST_PIXELS:,} pixels.")
         if not (-FULL_CIRCLE <= right < left <= right + FULL_CIRCLE):
             raise _wrong(
                 f"azimuth from {right:g} to {left:g} degrees",
@@ -228,18 +224,14 @@ def grid_at(entry: Entry) -> SphericalGrid:
     Raises:
         InputError: An unknown name, or something that does not describe a grid.
     """
-    if not isinstance(entry.value, str):
-        return _described(entry)
-    if entry.value not in PUBLISHED_GRIDS:
-        raise entry.fault(
-            f"there is no grid named {shown(entry.value)}",
-            f"Available: {', '.join(PUBLISHED_GRIDS)}; or describe one by columns, rows and "
-            "inclination.",
-        )
-    return _described(Entry(entry.source, entry.key, PUBLISHED_GRIDS[entry.value]))
-
-
-def _described(entry: Entry) -> SphericalGrid:
+    if isinstance(entry.value, str):
+        if entry.value not in PUBLISHED_GRIDS:
+            raise entry.fault(
+                f"there is no grid named {shown(entry.value)}",
+                f"Available: {', '.join(PUBLISHED_GRIDS)}; or describe one by columns, rows and "
+                "inclination.",
+            )
+        entry = Entry(entry.source, entry.key, PUBLISHED_GRIDS[entry.value])
     parts = {"azimuth": ALL_AROUND, **entry.record(_PARSERS, required=("columns",))}
     columns, azimuth = parts.pop("columns"), parts.pop("azimuth")
     try:
@@ -258,18 +250,14 @@ def _described(entry: Entry) -> SphericalGrid:
     )
 
 
-def _numbers(entry: Entry) -> tuple[float, ...]:
-    return tuple(item.number() for item in entry.items())
-
-
 # What reads each part of a grid's description. No image has more rows or columns than pixels.
 _PARSERS: dict[str, Callable[[Entry], Any]] = {
     "columns": lambda entry: entry.whole(1, MOST_PIXELS),
     "rows": lambda entry: entry.whole(1, MOST_PIXELS),
     "azimuth": lambda entry: entry.numbers(2),
     "inclination": lambda entry: entry.numbers(2),
-    "beams": _numbers,
-    "edges": _numbers,
+    "beams": Entry.numbers,
+    "edges": Entry.numbers,
 }
 
 

@@ -12,6 +12,7 @@ from derain.files.documents import Entry
 from derain.scan import Scan
 from derain.system.registry import Registry
 from derain.views.candidates import Candidates
+from derain.views.spherical_grid import ALL_AROUND
 from derain.views.window import Window, WindowOfScans
 
 # In a target: nothing is there to be judged, such as in a pixel without a return.
@@ -120,9 +121,12 @@ class View(ABC):
         """Its part of a Spec, JSON-able: its name as ``kind``, and what is its own."""
 
     @property
-    @abstractmethod
     def azimuth(self) -> tuple[float, float]:
-        """Its field of view: right and left bound, degrees counter-clockwise from x."""
+        """Its field of view: right and left bound, degrees counter-clockwise from x.
+
+        By default everything around.
+        """
+        return ALL_AROUND
 
     @property
     def window(self) -> Window:

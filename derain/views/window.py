@@ -2,16 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from derain.errors import InputError
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from derain.scan import Scan
+from derain.scan import Scan
 
 
 @dataclass(frozen=True)
@@ -53,17 +49,16 @@ class PlacedScan:
         stretch: Scans of one number have poses in one world, with none in doubt between them.
     """
 
-    scan: "Scan"
+    scan: Scan
     time: float | None = None
-    pose: "NDArray[np.float64] | None" = None
+    pose: NDArray[np.float64] | None = None
     stretch: int = 0
 
-    def to(self, other: "PlacedScan") -> "NDArray[np.float64] | None":
+    def to(self, other: "PlacedScan") -> NDArray[np.float64] | None:
         """Takes the frame of this scan to that of another, float64 (4, 4); None if not known."""
         if self.pose is None or other.pose is None or self.stretch != other.stretch:
             return None
-        transform: NDArray[np.float64] = np.linalg.inv(other.pose) @ self.pose
-        return transform
+        return np.linalg.inv(other.pose) @ self.pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +78,6 @@ class WindowOfScans:
     after: Sequence[PlacedScan] = ()
 
     @property
-    def scan(self) -> "Scan":
+    def scan(self) -> Scan:
         """The scan that is to be judged."""
         return self.judged.scan

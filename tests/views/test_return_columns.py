@@ -70,7 +70,7 @@ def test_the_columns_of_a_file_agree_with_directions(columns) -> None:
     by_directions = pair_returns(Scan.of(recording.xyz))
     stated = pair_returns(scan)
     assert stated.found_by in {name.lower() for name in scan.fields}
-    for name in ("nearer", "farther", "partner", "partner_range"):
+    for name in ("nearer", "farther", "partner"):
         np.testing.assert_array_equal(getattr(stated, name), getattr(by_directions, name))
 
 
@@ -144,7 +144,6 @@ def test_a_second_return_in_the_row_of_the_first_is_known_by_its_range() -> None
     assert returns.nearer.tolist() == [True, False, False, False]
     assert returns.farther.tolist() == [False, True, False, False]
     assert (returns.partner == -1).all()
-    np.testing.assert_allclose(returns.partner_range, [30, 4, np.nan, np.nan], rtol=1e-6)
 
 
 def test_ranges_that_no_sensor_measures_are_no_second_return() -> None:
@@ -152,7 +151,6 @@ def test_ranges_that_no_sensor_measures_are_no_second_return() -> None:
     returns = pair_returns(Scan(np.full((4, 3), 9, np.float32), fields=columns))
     assert returns.nearer.tolist() == [False, False, False, True]
     assert not returns.farther.any()
-    assert np.isnan(returns.partner_range[:3]).all()
 
 
 def test_ousters_second_returns_lie_behind_the_first_or_in_front(shared) -> None:
@@ -163,8 +161,6 @@ def test_ousters_second_returns_lie_behind_the_first_or_in_front(shared) -> None
     assert both.sum() > 50
     np.testing.assert_array_equal(returns.nearer, both & (second > first))
     np.testing.assert_array_equal(returns.farther, both & (second < first))
-    # The beams start some millimetres from the middle, which the coordinates are seen from.
-    np.testing.assert_allclose(returns.partner_range[both], second[both] / 1000, rtol=0.02)
 
 
 def test_the_types_of_the_velodyne_file_follow_from_its_geometry(shared) -> None:

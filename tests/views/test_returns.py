@@ -12,7 +12,7 @@ from derain.scan import Scan
 from derain.simulation.sensor import unit_vectors
 from derain.views.directions import FEWEST_PAIRS, TOLERANCES, shared_direction_pairs
 from derain.views.return_columns import LEAST_APART
-from derain.views.returns import RayReturns, pair_returns
+from derain.views.returns import pair_returns
 
 from ..two_returns import Recording
 
@@ -32,10 +32,6 @@ def test_the_rays_of_a_sensor_of_two_returns_are_found(seed, share, step) -> Non
     np.testing.assert_array_equal(returns.partner, partner)
     np.testing.assert_array_equal(returns.nearer, nearer)
     np.testing.assert_array_equal(returns.farther, farther)
-    np.testing.assert_allclose(
-        returns.partner_range[recording.two], recording.distance[partner[recording.two]], rtol=1e-5
-    )
-    assert np.isnan(returns.partner_range[~recording.two]).all()
     assert returns.found_by == "directions"
 
 
@@ -82,7 +78,7 @@ def test_rows_written_twice_are_one_return_and_have_the_same_role() -> None:
     recording = Recording(0)
     plain = pair_returns(Scan.of(recording.xyz))
     doubled = pair_returns(Scan.of(np.concatenate([recording.xyz, recording.xyz])))
-    for name in ("nearer", "farther", "partner", "partner_range"):
+    for name in ("nearer", "farther", "partner"):
         np.testing.assert_array_equal(getattr(doubled, name), np.tile(getattr(plain, name), 2))
 
 
@@ -139,8 +135,6 @@ def test_hard_cases_have_an_answer(name) -> None:
     assert returns.partner.max(initial=-1) < len(scan)
     assert (returns.nearer | returns.farther)[has].all()
     assert not (has & ~scan.valid).any()
-    assert np.isfinite(returns.partner_range[has]).all()
-    assert np.isnan(returns.partner_range[~has]).all()
 
 
 def test_a_scan_is_paired_once() -> None:
@@ -151,6 +145,6 @@ def test_a_scan_is_paired_once() -> None:
 @pytest.mark.parametrize("name", CLEAN)
 def test_real_scans_of_single_returns_have_no_pair(shared, name) -> None:
     returns = pair_returns(read_scan(shared / "data" / "clean" / name))
-    single = RayReturns.single(len(returns.nearer))
-    for column in ("nearer", "farther", "partner", "partner_range", "found_by"):
-        np.testing.assert_array_equal(getattr(returns, column), getattr(single, column))
+    assert not returns.dual
+    assert not (returns.nearer | returns.farther).any()
+    assert (returns.partner == -1).all()

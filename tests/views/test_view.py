@@ -15,7 +15,7 @@ from derain.spec import Spec
 from derain.views.isolated_points import CHANNELS, IsolatedPointView
 from derain.views.neighbours import Neighbourhoods, NeighbourView
 from derain.views.range_image import RangeView
-from derain.views.spherical_grid import ALL_AROUND, grid_of
+from derain.views.spherical_grid import grid_of
 from derain.views.view import VIEWS, View
 from derain.views.window import PlacedScan, Window, WindowOfScans
 
@@ -87,10 +87,6 @@ class ChangeView(View):
 
     def as_dict(self) -> dict[str, Any]:
         return {"kind": self.NAME}
-
-    @property
-    def azimuth(self) -> tuple[float, float]:
-        return ALL_AROUND
 
     @property
     def window(self) -> Window:

@@ -80,7 +80,7 @@ class Npy(Format):
         Columns of one dtype become an array (N, C), unless the scan comes from a structured one;
         columns of several become a structured array. Organised clouds stay organised.
         """
-        named = isinstance(scan.header, NpyHeader) and scan.header.structured
+        named = self.names_columns(scan)
         columns = scan.fields if named else columns_of(scan)
         return _to_bytes(_gridded(scan, _table(columns, named)))
 
@@ -162,8 +162,7 @@ def _array(data: bytes) -> NDArray[Any]:
     if size > len(data) - file.tell() and not dtype.hasobject:
         raise ValueError(f"{size:,} bytes in the header, {len(data) - file.tell():,} behind it")
     file.seek(0)
-    array: NDArray[Any] = npy_format.read_array(file, allow_pickle=False)
-    return array
+    return npy_format.read_array(file, allow_pickle=False)
 
 
 def _to_bytes(array: NDArray[Any]) -> bytes:
