@@ -81,7 +81,7 @@ def _described(roots: list[Path]) -> Iterator[Described]:
     data = named_scans(roots, card, Loading())
     for recording in recordings_of(data.source("test")):
         scans = [data.read(frame) for frame in recording]
-        points = [ScanPoints.of(scan, usable_cores()) for scan in scans]
+        points = [ScanPoints(scan, usable_cores()) for scan in scans]
         rows = [distinct_rows(scan)[0] for scan in scans]
         alone = [model.judge(scan) for scan in scans]
         drops = [judged.rain[first] for judged, first in zip(alone, rows, strict=True)]

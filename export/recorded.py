@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from hashlib import sha256
-from typing import Any, ClassVar
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -11,12 +11,10 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.export.runtime import Derainer
-from derain.recordings.placing import PlacedFrames, are_placed
+from derain.recordings.placing import PlacedFrames, PlacedMethod
 from derain.recordings.rays import RayEvidence, Rays, mean_evidence, ray_evidence
 from derain.scan import Scan
-from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
-from derain.sources.method import Method
 from derain.sources.recent_frames import FrameInWindow
 from derain.system.stopwatch import Stopwatch
 from derain.views.morton import evenly
@@ -46,14 +44,14 @@ UNLIKE = ScanIssue(
 CHECKED = 2000
 
 
-class RecordedDerainer(Method):
+class RecordedDerainer(PlacedMethod):
     """Judges the scans of a recording by a model, and by the rays of the scans around each.
 
     Rays of another scan that end where a point is show something solid there, unless the model
     takes their own ends for rain. Those that went through the place show that nothing was. Where
     the sensor was comes from the poses of the frames, or else from odometry. A scan of which that
     is not known, or whose pose does not match what it shows, is judged alone. Rays of a scan that
-    the model cannot judge show nothing.
+    the model cannot judge show nothing. Its stages are those of the model, odometry and rays.
 
     Example:
         >>> derainer = RecordedDerainer(Derainer("model.onnx"), past=1)
@@ -69,8 +67,6 @@ class RecordedDerainer(Method):
         InputError: Numbers of scans below 0, or a model that sees several scans itself.
     """
 
-    EXAMINE_EVERY: ClassVar[int] = 1  # any scan may be one beside which another fails
-
     def __init__(self, model: Derainer, past: int = 1, delay: int = 0) -> None:
         if not model.window.is_one_scan:
             reason = "its view already sees several scans"
@@ -85,52 +81,15 @@ class RecordedDerainer(Method):
         """The scans before and after the one that it judges."""
         return self._window
 
-    def depends_on(self, recording: Sequence[Frame]) -> Window | None:
-        """Its window where all poses are known, else all scans, from which they are found."""
-        return self.window if are_placed(recording) else None
-
     def fingerprint(self) -> str:
         """A fingerprint of the model, and of the number of scans around one that it sees."""
         seen = f"{self.model.fingerprint()} {self.window.before} {self.window.after}"
         return sha256(seen.encode()).hexdigest()[:16]
 
-    @property
-    def waiting(self) -> int:
-        """Number of frames that were pushed and not answered."""
-        return self._frames.waiting
-
-    def starts_new_recording(self, frame: Frame) -> bool:
-        """True if a frame does not follow those that wait."""
-        return self.waiting > 0 and self._frames.starts_new_recording(frame)
-
-    def push(
-        self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch | None = None
-    ) -> Judgement | None:
-        """Takes the next frame of a recording; see :meth:`derain.sources.method.Method.push`.
-
-        The stages are those of the model, odometry, and rays.
-        """
-        stopwatch = stopwatch or Stopwatch()
-        ready = self._frames.place(frame, stopwatch)
-        return None if ready is None else self._judged(ready, stopwatch)
-
-    def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
-        """Ends a recording: answers for the frames that still wait, with the scans that there are.
-
-        Args:
-            stopwatch: Takes the times of the stages of the model, and rays.
-
-        Raises:
-            InputError: A network that fails.
-        """
-        while self.waiting:
-            yield self._judged(self._frames.pop(), stopwatch or Stopwatch())
-        self._end_recording()
-
     def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
         """Warnings about a scan for the model, and about the scans around it."""
         yield from self.model.issues(judgement)
-        yield from self._frames.damage(judgement.scan)
+        yield from self._recent.damage(judgement.scan)
         yield from self._odd.get(judgement.scan, ())
 
     def as_dict(self) -> dict[str, Any]:
@@ -146,7 +105,7 @@ class RecordedDerainer(Method):
         )
 
     def _end_recording(self) -> None:
-        self._frames = PlacedFrames(self.window, self.model.threads)
+        self._recent = PlacedFrames(self.window, self.model.threads)
         self._rays: WeakKeyDictionary[Scan, Rays] = WeakKeyDictionary()
         self._alone: dict[Scan, Judgement | None] = {}
         self._odd: WeakKeyDictionary[Scan, list[ScanIssue]] = WeakKeyDictionary()

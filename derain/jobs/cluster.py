@@ -30,11 +30,15 @@ def dask_executor(address: str) -> Iterator[Submits]:
         InputError: No scheduler answers, or the workers have another version of derain, or none.
     """
     distributed = DISTRIBUTED.load("--dask")
-    scheduler = _address(address)
     try:
+        scheduler = _address(address)
         client = distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:
-        raise _no_scheduler(address, str(error)) from error
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            "--dask",
+            f"no scheduler answers at {address} ({error})",
+            "Start one by `dask scheduler`, and give the address that it prints.",
+        ) from error
     with client:
         _refuse_other_versions(client)
         yield client.get_executor(pure=False)
@@ -47,26 +51,18 @@ def _address(named: str) -> str:
         named: The address, or the file that the scheduler writes.
 
     Raises:
-        InputError: Nobody listens there, or it is neither an address nor such a file.
+        OSError: Nobody listens there.
+        ValueError: It is neither an address nor such a file.
+        KeyError: Likewise.
+        TypeError: Likewise.
     """
-    try:
-        path = Path(named)
-        address = str(json.loads(path.read_bytes())["address"]) if path.is_file() else named
-        parts = urlsplit(address)
-        if parts.hostname is None or parts.port is None:
-            raise ValueError("neither the file of a scheduler nor an address with a port")
-        socket.create_connection((parts.hostname, parts.port), PATIENCE).close()
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise _no_scheduler(named, str(error)) from error
+    path = Path(named)
+    address = str(json.loads(path.read_bytes())["address"]) if path.is_file() else named
+    parts = urlsplit(address)
+    if parts.hostname is None or parts.port is None:
+        raise ValueError("neither the file of a scheduler nor an address with a port")
+    socket.create_connection((parts.hostname, parts.port), PATIENCE).close()
     return address
-
-
-def _no_scheduler(address: str, reason: str) -> InputError:
-    return InputError(
-        "--dask",
-        f"no scheduler answers at {address} ({reason})",
-        "Start one by `dask scheduler`, and give the address that it prints.",
-    )
 
 
 def version() -> str:

@@ -7,7 +7,6 @@ record ``units/<id>.json`` for each unit that is done or failed. Each file is wr
 import json
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from hashlib import sha256
@@ -127,12 +126,11 @@ class Job:
         Raises:
             InputError: It was stopped before it listed them, or the list is damaged.
         """
+        content = self._documents.read(UNITS)
         try:
-            listed = _parsed(self._documents.read(UNITS))
+            listed = json.loads(content or b"")
             return [Unit(id=id_, size=size, inputs=inputs) for id_, size, inputs in listed]
         except (TypeError, ValueError) as error:
-            if isinstance(error, InputError):  # the store cannot be reached
-                raise
             raise InputError(
                 without_secrets(str(self.folder)),
                 "was started, but its units are not listed yet",
@@ -162,8 +160,8 @@ class Job:
 
     def _record_of(self, unit: Unit, content: bytes | None) -> Record | None:
         try:
-            record = Record(**_parsed(content))
-        except TypeError:  # no record, or one of another version
+            record = Record(**json.loads(content or b""))
+        except (TypeError, ValueError):  # no record, a damaged one, or one of another version
             return None
         unchanged = (unit.inputs, self.fingerprint) == (record.inputs, record.options)
         return record if unchanged else None
@@ -257,10 +255,3 @@ def differences(begun: Mapping[str, Any], now: Mapping[str, Any]) -> str:
 
 def _name(unit: str) -> str:
     return f"{RECORDS}/{unit}.json"
-
-
-def _parsed(content: bytes | None) -> Any:
-    """The content of a document; None if it is missing or damaged."""
-    with suppress(ValueError):
-        return None if content is None else json.loads(content)
-    return None

@@ -4,9 +4,9 @@ import multiprocessing
 import pickle
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, nullcontext
 from multiprocessing.connection import Connection
 from queue import SimpleQueue
 from typing import Any, Self, TypeVar
@@ -21,18 +21,13 @@ TRIES = 3
 Result = TypeVar("Result")
 
 
-@contextmanager
-def processes(count: int) -> Iterator["WorkerPool | None"]:
+def processes(count: int) -> AbstractContextManager["WorkerPool | None"]:
     """Lends processes of this machine as an executor; None for one, which is this process.
 
     Args:
         count: Number of processes.
     """
-    if count == 1:
-        yield None
-    else:
-        with WorkerPool(count) as pool:
-            yield pool
+    return nullcontext() if count == 1 else WorkerPool(count)
 
 
 class WorkerPool(ThreadPoolExecutor):

@@ -7,14 +7,13 @@ independent witnesses, with weights fitted to simulated drives, whose truth is k
 point and its neighbours vote, because drops fly among drops and surfaces hang together.
 """
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.recordings.rays import RayEvidence, Rays, range_of, ray_evidence
+from derain.recordings.rays import RayEvidence, Rays, ray_evidence
 from derain.scan import Scan
 from derain.views.morton import distinct_rows
 from derain.views.neighbour_search import NeighbourSearch
@@ -48,46 +47,31 @@ HALF_AT = (0.1, 0.01)
 LARGEST_LOG_ODDS = 4.0
 
 
-@dataclass(frozen=True, eq=False)
 class ScanPoints:
     """The M distinct positions of a scan that can be judged, along a Morton curve.
+
+    Args:
+        scan: The scan.
+        threads: Threads of every search.
 
     Attributes:
         xyz: Coordinates, float64 (M, 3), metres, in the sensor's frame.
         inverse: Point of each row of the scan, int64 (N,); -1 for rows that cannot be judged.
         neighbours: Of each point itself and its nearest neighbours, rows of ``xyz``, int64 (M, k).
         distances: Their distances, metres, float64 (M, k).
-        threads: Threads of every search.
     """
 
-    xyz: NDArray[np.float64]
-    inverse: NDArray[np.int64]
-    neighbours: NDArray[np.int64]
-    distances: NDArray[np.float64]
-    threads: int
-
-    @classmethod
-    def of(cls, scan: Scan, threads: int) -> Self:
-        """Finds the points of a scan and their neighbours.
-
-        Args:
-            scan: The scan.
-            threads: Threads of every search.
-        """
-        first, inverse = distinct_rows(scan)
+    def __init__(self, scan: Scan, threads: int) -> None:
+        first, self.inverse = distinct_rows(scan)
         xyz = scan.xyz.take(first, axis=0)
-        neighbours, distances = NeighbourSearch(xyz, rank=first, threads=threads)(NEIGHBOURS)
-        return cls(
-            xyz.astype(np.float64), inverse, neighbours, distances.astype(np.float64), threads
-        )
+        search = NeighbourSearch(xyz, rank=first, threads=threads)
+        self.neighbours, distances = search(NEIGHBOURS)
+        self.distances = distances.astype(np.float64)
+        self.xyz = xyz.astype(np.float64)
+        self._threads = threads
 
     def __len__(self) -> int:
         return len(self.xyz)
-
-    @cached_property
-    def range(self) -> NDArray[np.float64]:
-        """Distance from the sensor, metres, float64 (M,); a centimetre at least."""
-        return range_of(self.xyz)
 
     def evidence_of(
         self,
@@ -108,7 +92,7 @@ class ScanPoints:
     @cached_property
     def rays(self) -> Rays:
         """The rays that end at the points."""
-        return Rays(self.xyz, self.threads)
+        return Rays(self.xyz, self._threads)
 
 
 def surroundings_features(points: ScanPoints) -> NDArray[np.float64]:
@@ -125,11 +109,11 @@ def surroundings_features(points: ScanPoints) -> NDArray[np.float64]:
         One, the numbers, and their six squares and products, float64 (M, 10), finite.
     """
     step = max(points.rays.step, LEAST_STEP)
-    steps_apart = points.distances[:, 1:].mean(axis=1) / (points.range * step)
+    steps_apart = points.distances[:, 1:].mean(axis=1) / (points.rays.range * step)
     scatter = scatter_through_space(points.xyz, points.neighbours)
     apart = np.log(steps_apart + STEP_EPSILON) - USUAL_STEPS
     rough = (np.log(scatter + FLATTEST) - USUAL_SCATTER) / SPREAD_OF_SCATTER
-    far = np.log(points.range / USUAL_RANGE)
+    far = np.log(points.rays.range / USUAL_RANGE)
     return np.stack(
         [
             *(np.ones_like(apart), apart, rough, far),
@@ -165,7 +149,7 @@ def vote(points: ScanPoints, log_odds: NDArray[np.float64]) -> NDArray[np.float6
         float64 (M,).
     """
     offset, slope = HALF_AT
-    half_at = (offset + slope * points.range)[:, None]
+    half_at = (offset + slope * points.rays.range)[:, None]
     weight = 1 / (1 + np.square(points.distances / half_at))
     votes = np.clip(log_odds, -LARGEST_LOG_ODDS, LARGEST_LOG_ODDS).take(points.neighbours)
     total: NDArray[np.float64] = np.einsum("ij,ij->i", weight, votes)

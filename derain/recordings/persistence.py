@@ -1,6 +1,6 @@
 """Rain by free space: what rays of the scans before and after went through was not there."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, Self
 from weakref import WeakKeyDictionary
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from derain.files.documents import Entry
 from derain.recordings.evidence import ScanPoints, combined_log_odds, vote
-from derain.recordings.placing import PlacedFrames, are_placed
+from derain.recordings.placing import PlacedFrames, PlacedMethod
 from derain.recordings.rays import RayEvidence, mean_evidence
 from derain.recordings.recording_method import METHODS, RecordingMethod
 from derain.scan import Scan
@@ -55,7 +55,7 @@ class Persistence:
 
 
 @METHODS.add("persistence")
-class PersistenceDerainer(RecordingMethod):
+class PersistenceDerainer(PlacedMethod, RecordingMethod):
     """Calls rain what is not where it was, by rays of other scans and its surroundings.
 
     Solid things are where they were a tenth of a second ago; a drop is not, and the rays that pass
@@ -66,6 +66,7 @@ class PersistenceDerainer(RecordingMethod):
     Poses are those of the frames. Where a frame has none, or the record of it is damaged, they are
     found as it goes, and where that fails, no evidence is taken across the gap. A scan without any
     other is judged by itself: nothing of it is known for sure, and nothing of it is called rain.
+    Its stages are read, odometry where no pose is given, view, network (the evidence) and back.
 
     Example:
         >>> scans = [derain.read_scan("scan.bin")] * 3  # a wall, and drops that stay where they are
@@ -83,7 +84,6 @@ class PersistenceDerainer(RecordingMethod):
     """
 
     HELP: ClassVar[str] = "rain does not stay in its place: rays of other scans pass through it"
-    EXAMINE_EVERY: ClassVar[int] = 1  # any scan may be one whose place is not known
 
     def __init__(self, persistence: Persistence = Persistence(), threads: int = 0) -> None:
         self.persistence = persistence
@@ -103,40 +103,6 @@ class PersistenceDerainer(RecordingMethod):
     def window(self) -> Window:
         """The scans before and after the one that it judges."""
         return Window(self.persistence.before, self.persistence.after)
-
-    def depends_on(self, recording: Sequence[Frame]) -> Window | None:
-        """Its window where all poses are known, else all scans, from which they are found."""
-        return self.window if are_placed(recording) else None
-
-    @property
-    def waiting(self) -> int:
-        """Number of frames that were pushed and not answered."""
-        return self._recent.waiting
-
-    def starts_new_recording(self, frame: Frame) -> bool:
-        """True if a frame does not follow those that wait."""
-        return self.waiting > 0 and self._recent.starts_new_recording(frame)
-
-    def push(
-        self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch | None = None
-    ) -> Judgement | None:
-        """Takes the next frame of a recording; see :meth:`derain.sources.method.Method.push`.
-
-        The stages are read, odometry where no pose is given, view, network (the evidence) and back.
-        """
-        stopwatch = stopwatch or Stopwatch()
-        ready = self._recent.place(frame, stopwatch)
-        return None if ready is None else self._judged(ready, stopwatch)
-
-    def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
-        """Ends a recording: answers for the frames that still wait, with the scans that there are.
-
-        Args:
-            stopwatch: Takes the times of the stages network and back.
-        """
-        while self.waiting:
-            yield self._judged(self._recent.pop(), stopwatch or Stopwatch())
-        self._end_recording()
 
     def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
         """Warnings about a scan: its places, nothing known of it, or no pose to be trusted."""
@@ -166,7 +132,7 @@ class PersistenceDerainer(RecordingMethod):
         with ready.naming_errors(), stopwatch.stage("view"):
             for one in (scans.judged, *scans.before, *scans.after):
                 if one.scan not in self._points:
-                    self._points[one.scan] = ScanPoints.of(one.scan, self.threads)
+                    self._points[one.scan] = ScanPoints(one.scan, self.threads)
         points = self._points[scan]
         with ready.naming_errors(), stopwatch.stage("network"):
             evidence = self._evidence(scans)

@@ -1,7 +1,8 @@
 """The last frames of a recording, each where it was taken: by its pose, or else by odometry."""
 
+from abc import abstractmethod
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, ClassVar
 from weakref import WeakKeyDictionary
 
 from numpy.typing import NDArray
@@ -10,6 +11,8 @@ from derain.errors import InputError
 from derain.recordings.odometry import FrameOdometry
 from derain.scan import Scan
 from derain.sources.frame import Frame, MemoryFrame
+from derain.sources.judgement import Judgement
+from derain.sources.method import Method
 from derain.sources.recent_frames import FrameInWindow, RecentFrames
 from derain.system.stopwatch import Stopwatch
 from derain.views.scan_issues import ScanIssue
@@ -87,6 +90,59 @@ class PlacedFrames(RecentFrames):
             pose = registration.pose
         self._doubts[scan] = doubts
         return PlacedScan(scan, None, pose, self._stretch)
+
+
+class PlacedMethod(Method):
+    """A method that sees the scans around the one that it judges, each where it was taken."""
+
+    EXAMINE_EVERY: ClassVar[int] = 1  # any scan may be one whose place is not known
+
+    _recent: PlacedFrames
+
+    def depends_on(self, recording: Sequence[Frame]) -> Window | None:
+        """Its window where all poses are known, else all scans, from which they are found."""
+        return self.window if are_placed(recording) else None
+
+    @property
+    def waiting(self) -> int:
+        """Number of frames that were pushed and not answered."""
+        return self._recent.waiting
+
+    def starts_new_recording(self, frame: Frame) -> bool:
+        """True if a frame does not follow those that wait."""
+        return self.waiting > 0 and self._recent.starts_new_recording(frame)
+
+    def push(
+        self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch | None = None
+    ) -> Judgement | None:
+        """Takes the next frame of a recording; see :meth:`derain.sources.method.Method.push`.
+
+        The stages are read, odometry where no pose is given, and those of the method.
+        """
+        stopwatch = stopwatch or Stopwatch()
+        ready = self._recent.place(frame, stopwatch)
+        return None if ready is None else self._judged(ready, stopwatch)
+
+    def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
+        """Ends a recording: answers for the frames that still wait, with the scans that there are.
+
+        Args:
+            stopwatch: Takes the times of the method's stages.
+
+        Raises:
+            InputError: A frame that cannot be judged.
+        """
+        while self.waiting:
+            yield self._judged(self._recent.pop(), stopwatch or Stopwatch())
+        self._end_recording()
+
+    @abstractmethod
+    def _judged(self, ready: FrameInWindow, stopwatch: Stopwatch) -> Judgement:
+        """Judges a frame that has its window."""
+
+    @abstractmethod
+    def _end_recording(self) -> None:
+        """Makes its ``PlacedFrames`` anew, and forgets what it has kept of scans."""
 
 
 def are_placed(recording: Sequence[Frame]) -> bool:

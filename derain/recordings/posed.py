@@ -1,6 +1,6 @@
 """Frames with poses: from a file, of a sensor at rest, or computed by odometry."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -21,8 +21,6 @@ from derain.views.scan_issues import ScanIssue
 # What stands for poses that are in no file.
 STANDING, ODOMETRY = "standing", "odometry"
 
-OnRegistration = Callable[[Frame, Registration], None]
-
 
 @dataclass(frozen=True)
 class Odometry:
@@ -35,21 +33,13 @@ class Odometry:
     threads: int = 0
 
     def __call__(self, frames: Sequence[Frame]) -> list[tuple[Frame, list[ScanIssue]]]:
-        """Each frame with its pose, as :func:`with_poses` gives it, and warnings about it."""
-        issues: list[list[ScanIssue]] = []
-
-        def note(frame: Frame, registration: Registration) -> None:
-            issues.append(list(registration.issues()))
-
-        posed = with_poses(frames, ODOMETRY, self.threads, note)
-        return list(zip(posed, issues, strict=True))
+        """Each frame with its pose, as :func:`with_odometry` gives it, and warnings about it."""
+        registered = with_odometry(frames, self.threads)
+        return [(frame, list(registration.issues())) for frame, registration in registered]
 
 
 def with_poses(
-    source: Sequence[Frame],
-    poses: str | Path | None = None,
-    threads: int = 0,
-    on_registration: OnRegistration | None = None,
+    source: Sequence[Frame], poses: str | Path | None = None, threads: int = 0
 ) -> Frames:
     """The same frames, each with its pose.
 
@@ -59,7 +49,6 @@ def with_poses(
             with one for each recording, ``<sequence>.txt``. None takes the poses that lie beside
             the scans, and odometry for a recording in which a scan has none.
         threads: Threads that odometry may use; 0 takes every core.
-        on_registration: Called with each frame and its registration as soon as that is found.
 
     Returns:
         The frames. Where odometry cannot be trusted, the frame no longer follows the one before it:
@@ -71,36 +60,40 @@ def with_poses(
     if poses == STANDING:
         return Frames(frame.with_pose(np.eye(4)) for frame in source)
     if poses == ODOMETRY:
-        return _with_odometry_poses(source, threads, on_registration)
+        return Frames(frame for frame, _ in with_odometry(source, threads))
     if poses is not None:
         return _with_file_poses(source, Path(poses))
     found: list[Frame] = []
     for recording in recordings_of(source):
         known = all(frame.pose is not None for frame in recording)
-        found += recording if known else _with_odometry_poses(recording, threads, on_registration)
+        found += recording if known else with_poses(recording, ODOMETRY, threads)
     return Frames(found)
 
 
-def _with_odometry_poses(
-    source: Sequence[Frame], threads: int, on_registration: OnRegistration | None
-) -> Frames:
+def with_odometry(
+    source: Sequence[Frame], threads: int = 0
+) -> Iterator[tuple[Frame, Registration]]:
     """The same frames with poses found from their scans, which are all read once.
 
     The poses of a recording are in the frame of its first scan. A scan that cannot be read or
     registered is where the sensor would be if it had gone on as it did, and neither follows the
     one before it nor is followed by the one after.
+
+    Args:
+        source: The frames.
+        threads: Threads that odometry may use; 0 takes every core.
+
+    Yields:
+        Each frame with its pose, as soon as that is found, and its registration.
     """
     odometry = FrameOdometry(threads)
-    posed: list[Frame] = []
     gaps = 0  # of all recordings: two parts of one must not close up to one another
     for recording in recordings_of(source):
         for frame in recording:
             registration = odometry.register(frame, _scan_of(frame))
-            if on_registration is not None:
-                on_registration(frame, registration)
             gaps += not registration.trusted
-            posed.append(replace(frame.with_pose(registration.pose), number=frame.number + gaps))
-    return Frames(posed)
+            posed = replace(frame.with_pose(registration.pose), number=frame.number + gaps)
+            yield posed, registration
 
 
 def _with_file_poses(source: Sequence[Frame], path: Path) -> Frames:

@@ -87,11 +87,10 @@ class CleanSink:
     def __enter__(self) -> Self:
         for folder in filter(None, (self._files.folder, self._files.removed)):
             require_writable_folder(folder)
-        self._bags.__enter__()
         return self
 
-    def __exit__(self, *error: object) -> None:
-        self._bags.__exit__(*error)
+    def __exit__(self, kind: object, *_: object) -> None:
+        self._bags.end(failed=kind is not None)
 
     def targets(self) -> Iterator[Path]:
         """Every file and bag that it may write."""

@@ -7,7 +7,6 @@ from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
 
 from derain.bags.bag_copy import BagCopy, written_name
 from derain.bags.cloud_message import CloudMessage
@@ -49,6 +48,7 @@ class CleanedBags:
     """Writes copies of whole bags, each with the clean clouds that it is given.
 
     A cloud without a result does not change. A bag that cannot be written to its end is removed.
+    After the last cloud, :meth:`end` has to be called.
 
     Args:
         out: The folder to write to.
@@ -111,12 +111,17 @@ class CleanedBags:
                 self._stack.close()
             raise
 
-    def __enter__(self) -> Self:
-        return self
+    def end(self, failed: bool) -> None:
+        """Ends the last copy, and moves it into place.
 
-    def __exit__(self, kind: object, *_: object) -> None:
+        Args:
+            failed: True if not all clouds were written: the last copy is removed.
+
+        Raises:
+            InputError: One of the copies could not be written.
+        """
         with self._stack:
-            if kind is not None:
+            if failed:
                 return
             self._finish()
         if self._broken:

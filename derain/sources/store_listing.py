@@ -4,12 +4,12 @@ The objects are listed once. Empty files at the same paths in a temporary folder
 layout they have; only what lies beside the scans is fetched: times, poses, metadata of bags.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import TypeVar
 
-from derain.bags.names import BAG_METADATA, split, stem
+from derain.bags.names import BAG_METADATA, files_of, split, stem
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS, RECORDS
 from derain.jobs.job import FOLDER, JOB
@@ -91,8 +91,9 @@ class _Listing:
         """The bag that a path of the mirror leads into, as one frame."""
         found = split(path)
         assert found is not None
-        bag, inner = found[0].relative_to(self._root), found[1]
-        files = [bag] if bag in self._objects else [*self._inside(bag)]
+        place, inner = found
+        bag = place.relative_to(self._root)
+        files = [file.relative_to(self._root) for file in files_of(place)]
         return [
             StoredBag(
                 key=prefix or stem(bag),
@@ -120,14 +121,10 @@ class _Listing:
             path=path,
             columns=frame.columns,
             objects=(self._objects[path],),
-            recorded=(self._recorded(lambda: frame.time), self._recorded(lambda: frame.pose)),
+            recorded_time=self._recorded(lambda: frame.time),
+            recorded_pose=self._recorded(lambda: frame.pose),
             records_stamp=self._stamp(path.parent),
         )
-
-    def _inside(self, folder: Path) -> Iterator[Path]:
-        """The objects directly in a folder."""
-        inside = sorted((self._root / folder).iterdir())
-        yield from (file.relative_to(self._root) for file in inside if file.is_file())
 
     def _stamp(self, folder: Path) -> str:
         """Sizes and versions of the records of the scans in a folder."""

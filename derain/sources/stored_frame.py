@@ -57,36 +57,35 @@ class StoredScan(StoredFrame):
     """A scan in an object store. Each time it is read, it is fetched.
 
     Attributes:
-        recorded: Its time and pose, from the records beside it: the value, or
-            the error of a damaged record.
+        recorded_time: Its time, seconds, from the records beside it; or the error of a damaged one.
+        recorded_pose: Its pose, float64 (4, 4), metres, likewise.
         records_stamp: Changes when these records do.
         file: Its path on this machine while it is fetched.
     """
 
-    recorded: tuple[
-        float | InputError | None,
-        NDArray[np.float64] | InputError | None,
-    ] = (None, None)
+    recorded_time: float | InputError | None = None
+    recorded_pose: NDArray[np.float64] | InputError | None = None
     records_stamp: str = ""
     file: Path | None = None
 
     @property
     def time(self) -> float | None:
         """Time at which it was taken, seconds."""
-        return _value(self.recorded[0])
+        return _value(self.recorded_time)
 
     @property
     def pose(self) -> NDArray[np.float64] | None:
         """Sensor to world, float64 (4, 4), as it was given, or else of its records."""
-        return _value(self.recorded[1]) if self.sensor_to_world is None else self.sensor_to_world
+        return _value(self.recorded_pose) if self.sensor_to_world is None else self.sensor_to_world
 
     def read(self) -> Scan:
         """Reads the scan, without labels."""
-        if self.file is not None:
-            return self._scan_in(self.file)
-        with mirror() as where:
-            where.fetch(self.objects)
-            return self._scan_in(where.root / self.path)
+        if self.file is None:
+            with mirror() as where:
+                where.fetch(self.objects)
+                return self.fetched(where)[0].read()
+        scan = read_scan(self.file, self.columns).with_intensity_times(self.intensity_scale)
+        return replace(scan, name=self.name)
 
     def stamp(self) -> str:
         """Size and version of its object, and of the records beside it."""
@@ -95,11 +94,6 @@ class StoredScan(StoredFrame):
     def fetched(self, where: Mirror) -> list[FileFrame]:
         """The scan in its file on this machine."""
         return [replace(self, file=where.root / self.path)]
-
-    def _scan_in(self, file: Path) -> Scan:
-        """Reads the scan from its file on this machine."""
-        scan = read_scan(file, self.columns).with_intensity_times(self.intensity_scale)
-        return replace(scan, name=self.name)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

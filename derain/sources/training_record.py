@@ -40,7 +40,7 @@ def record_of_scans(frames: Sequence[Frame]) -> dict[str, tuple[str, ...]]:
 def record_of_parts(
     records: Iterable[tuple[str, Mapping[str, Sequence[str]]]],
 ) -> dict[str, tuple[str, ...]]:
-    """Record of a training on several data setswith a record each.
+    """Record of a training on several data sets with a record each.
 
     Args:
         records: Name of each data set, and its record; there may be several of one name.

@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from derain.files.atomic import replacing, temporary_folder, writing
-from derain.stores.objects import AT_ONCE, opened_folder, tried
+from derain.stores.objects import AT_ONCE, opened, tried
 from derain.stores.url import Place, is_url
 
 # Documents of a store that are read before the first of them is needed.
@@ -92,18 +92,22 @@ class ObjectDocuments:
 
     Args:
         url: URL of the folder.
+
+    Raises:
+        InputError: No such store, or a library is missing.
     """
 
     def __init__(self, url: str) -> None:
         self._url = url
+        self._filesystem, path = opened(url)
+        self._folder = path.rstrip("/")
 
     def read(self, name: str) -> bytes | None:
         """The content of a document; None if it is missing."""
-        filesystem, folder = opened_folder(self._url)
 
         def content() -> bytes | None:
             try:
-                read: bytes = filesystem.cat_file(f"{folder}/{name}")
+                read: bytes = self._filesystem.cat_file(f"{self._folder}/{name}")
             except FileNotFoundError:
                 return None
             json.loads(read)  # a read that breaks off shows here, and is tried again
@@ -113,9 +117,8 @@ class ObjectDocuments:
 
     def read_each(self, names: Sequence[str]) -> Iterator[bytes | None]:
         """The contents of many documents, several read at a time; one listing finds them."""
-        filesystem, folder = opened_folder(self._url)
-        keys = tried(self._url, lambda: filesystem.find(folder))
-        there = {key[len(folder) + 1 :] for key in keys}
+        keys = tried(self._url, lambda: self._filesystem.find(self._folder))
+        there = {key[len(self._folder) + 1 :] for key in keys}
         with ThreadPoolExecutor(AT_ONCE) as pool:
             for begin in range(0, len(names), READ_AT_ONCE):
                 some = names[begin : begin + READ_AT_ONCE]
@@ -123,28 +126,25 @@ class ObjectDocuments:
 
     def write(self, name: str, text: str) -> None:
         """Writes a document whole."""
-        filesystem, folder = opened_folder(self._url)
-        content = text.encode()
-        tried(f"{self._url}/{name}", lambda: filesystem.pipe_file(f"{folder}/{name}", content))
+        key, content = f"{self._folder}/{name}", text.encode()
+        tried(f"{self._url}/{name}", lambda: self._filesystem.pipe_file(key, content))
 
     def create(self, name: str, text: str) -> None:
         """Writes a document unless it exists."""
         if self.read(name) is not None:
             return
-        filesystem, folder = opened_folder(self._url)
         try:
-            filesystem.pipe_file(f"{folder}/{name}", text.encode(), mode="create")
+            self._filesystem.pipe_file(f"{self._folder}/{name}", text.encode(), mode="create")
         except Exception:  # it exists, the request failed, or the store has no such mode
             if self.read(name) is None:
                 self.write(name, text)
 
     def remove_all(self) -> None:
         """Removes all documents."""
-        filesystem, folder = opened_folder(self._url)
 
         def remove() -> None:
             with suppress(FileNotFoundError):
-                filesystem.rm(folder, recursive=True)
+                self._filesystem.rm(self._folder, recursive=True)
 
         tried(self._url, remove)
 

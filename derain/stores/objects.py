@@ -130,7 +130,7 @@ def upload(folder: Path, url: str) -> dict[str, str]:
     Raises:
         InputError: One of them cannot be written.
     """
-    filesystem, path = _opened(url)
+    filesystem, path = opened(url)
 
     def put(file: Path) -> StoredObject:
         relative = file.relative_to(folder).as_posix()
@@ -164,17 +164,12 @@ def tried(url: str, request: Callable[[], Result]) -> Result:
     raise AssertionError("the last try has no wait")
 
 
-def opened_folder(url: str) -> tuple[Any, str]:
-    """The file system of a store, of fsspec, and the path of a folder in it.
+def opened(url: str) -> tuple[Any, str]:
+    """The file system of a store, of fsspec, and the path of an object or a folder in it.
 
     Raises:
         InputError: No such store, or a library is missing.
     """
-    filesystem, path = _opened(url)
-    return filesystem, path.rstrip("/")
-
-
-def _opened(url: str) -> tuple[Any, str]:
     fsspec = FSSPEC.load(without_secrets(url), "core")
     try:
         # Nothing is remembered of a listing: others write there, too.
@@ -196,7 +191,7 @@ def _opened(url: str) -> tuple[Any, str]:
 
 def _found(url: str) -> list[StoredObject]:
     """The object at a URL, or those below it; an empty list if there is nothing."""
-    filesystem, path = _opened(url)
+    filesystem, path = opened(url)
     entries = tried(url, lambda: _entries(filesystem, url, path))
     return [_object(filesystem, entry) for entry in entries]
 
@@ -217,7 +212,7 @@ def _object(filesystem: Any, entry: Mapping[str, Any]) -> StoredObject:
 
 
 def _fetch(file: Path, stored: StoredObject) -> None:
-    filesystem, key = _opened(stored.url)
+    filesystem, key = opened(stored.url)
 
     def get() -> None:
         filesystem.get_file(key, str(file))

@@ -19,12 +19,12 @@ from derain.files import RECORDS
 from derain.files.atomic import require_writable
 from derain.files.reading import is_file
 from derain.recordings.odometry import FrameOdometry, Registration
-from derain.recordings.posed import ODOMETRY, with_poses
+from derain.recordings.posed import ODOMETRY, with_odometry, with_poses
 from derain.sources.frame import Frame
 from derain.sources.judging import Guard, unguarded
 from derain.sources.recordings import recordings_of
 from derain.sources.records import POSES
-from derain.sources.source import Source
+from derain.sources.source import Frames, Source
 from derain.sources.trajectory import Trajectory, write_trajectory
 from derain.system.notices import Notices, warn
 from derain.system.stopwatch import Stopwatch
@@ -146,15 +146,14 @@ def placed(source: Source, poses: str | None, threads: int = 0) -> Source:
     if poses != ODOMETRY:
         return with_poses(source, poses)
     notices = Notices()
-    with tqdm(total=len(source), desc=ODOMETRY, unit="scan", disable=None) as bar:
-
-        def watch(frame: Frame, registration: Registration) -> None:
-            notices.warn(frame.name, registration.issues())
-            bar.update()
-
-        posed = with_poses(source, ODOMETRY, threads, watch)
+    posed: list[Frame] = []
+    registered = with_odometry(source, threads)
+    bar = tqdm(registered, total=len(source), desc=ODOMETRY, unit="scan", disable=None)
+    for frame, registration in bar:
+        notices.warn(frame.name, registration.issues())
+        posed.append(frame)
     notices.warn_of_repeats()
-    return posed
+    return Frames(posed)
 
 
 def _register(frame: Frame, odometry: FrameOdometry, guard: Guard, watch: Watch) -> Registration:

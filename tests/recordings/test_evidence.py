@@ -20,7 +20,7 @@ from .test_rays import STEP, wall
 
 
 def points_of(xyz: NDArray[np.float64]) -> ScanPoints:
-    return ScanPoints.of(Scan.of(xyz), threads=1)
+    return ScanPoints(Scan.of(xyz), threads=1)
 
 
 def test_the_step_is_that_of_the_rays() -> None:
@@ -51,7 +51,7 @@ def test_a_vote_is_the_weighted_sum_of_clipped_voices() -> None:
     log_odds = np.random.default_rng(1).normal(0, 5, len(points))
     for number, total in enumerate(vote(points, log_odds)):
         near = points.neighbours[number]
-        far = points.distances[number] / (0.1 + 0.01 * points.range[number])
+        far = points.distances[number] / (0.1 + 0.01 * points.rays.range[number])
         voices = np.clip(log_odds[near], -LARGEST_LOG_ODDS, LARGEST_LOG_ODDS)
         assert total == pytest.approx((voices / (1 + far**2)).sum())
 

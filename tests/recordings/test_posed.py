@@ -9,12 +9,12 @@ import pytest
 
 from derain.errors import InputError
 from derain.files import write_scan
-from derain.recordings.odometry import FrameOdometry, Registration, shift_of
-from derain.recordings.posed import with_poses
+from derain.recordings.odometry import FrameOdometry, shift_of
+from derain.recordings.posed import with_odometry, with_poses
 from derain.scan import Scan
 from derain.sources.file_frame import FileFrame
 from derain.sources.folders import named_frames
-from derain.sources.frame import Frame, MemoryFrame
+from derain.sources.frame import MemoryFrame
 from derain.sources.source import Frames
 
 from .street import motion, scan_from
@@ -43,8 +43,8 @@ def lines(ahead: list[float]) -> str:
 
 
 def test_odometry_gives_poses_and_reports_each(drive) -> None:
-    registered: list[tuple[Frame, Registration]] = []
-    posed = with_poses(drive, "odometry", on_registration=lambda *each: registered.append(each))
+    registered = list(with_odometry(drive))
+    posed = with_poses(drive, "odometry")
     assert [frame.key for frame, _ in registered] == [frame.key for frame in drive]
     for number, (frame, (_, registration)) in enumerate(zip(posed, registered, strict=True)):
         np.testing.assert_array_equal(frame.pose, registration.pose)
@@ -66,16 +66,12 @@ def test_no_window_reaches_over_a_scan_that_cannot_be_registered(drive, unread) 
     bad = replace(drive[1], scan=Scan.of(np.zeros((0, 3))))
     if unread:
         bad = FileFrame(key="1", sequence="drive", number=1, path=Path("absent.bin"))
-    reasons: list[str] = []
-    posed = with_poses(
-        [drive[0], bad, *drive[2:]],
-        "odometry",
-        on_registration=lambda _, each: reasons.append(each.reason),
-    )
+    registered = list(with_odometry([drive[0], bad, *drive[2:]]))
+    posed = [frame for frame, _ in registered]
     following = [later.follows(earlier) for earlier, later in pairwise(posed)]
     assert following == [False, False, True]
     assert posed[3].pose[0, 3] == pytest.approx(1.3, abs=0.1)
-    assert ("cannot be read" if unread else "only 0 surfaces in reach") in reasons[1]
+    assert ("cannot be read" if unread else "only 0 surfaces in reach") in registered[1][1].reason
 
 
 def test_a_scan_taken_before_the_one_that_it_follows_is_not_trusted(drive) -> None:
@@ -138,14 +134,12 @@ def test_without_a_word_poses_beside_the_scans_count_and_odometry_fills_in(drive
         for number, frame in enumerate(drive[:2]):
             write_scan(tmp_path / name / f"{number:06d}.pcd", frame.read())
     (tmp_path / "known/poses.txt").write_text(lines([40, 50]))
-    registered: list[str] = []
-    posed = with_poses(
-        named_frames([tmp_path / "known", tmp_path / "unknown"], layouts=()),
-        on_registration=lambda frame, _: registered.append(frame.name),
-    )
+    source = named_frames([tmp_path / "known", tmp_path / "unknown"], layouts=())
+    posed = with_poses(source)
     assert x_of(posed)[:3] == [40, 50, 0]
     assert posed[3].pose[0, 3] == pytest.approx(1.3, abs=0.05)
-    assert registered == [str(tmp_path / f"unknown/00000{number}.pcd") for number in range(2)]
+    unchanged = [frame is before for frame, before in zip(posed, source, strict=True)]
+    assert unchanged == [True, True, False, False]
 
 
 def test_a_record_that_is_damaged_is_named_and_not_passed_over(drive, tmp_path) -> None:
