@@ -361,16 +361,12 @@ def _copied_to_float32(values: NDArray[Any]) -> NDArray[np.float32]:
         return np.array(values, np.float32, order="C")
 
 
-def _copied_to_bool(values: NDArray[Any]) -> NDArray[np.bool_]:
-    return np.array(values, bool)
-
-
 # What makes a column of a scan of an array that is given.
 _CONVERTERS: dict[str, Callable[[Any], NDArray[Any]]] = {
     "xyz": _copied_to_float32,
     "intensity": _copied_to_float32,
     "label": class_ids,
-    "radar": _copied_to_bool,
+    "radar": lambda values: np.array(values, bool),
 }
 
 

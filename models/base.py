@@ -243,8 +243,7 @@ class DerainingModule(MeasuredModule):
         if task.spec is not self._spec:
             self.adopt(task.spec)
         self.card = task.card
-        metrics = RainMetrics(self.card.classes, self.card.rain, unknown=self.card.unknown)
-        self.metrics = metrics.to(self.device)
+        self.metrics = RainMetrics(self.card).to(self.device)
         self.threshold_counts = ThresholdCounts([task.spec.threshold]).to(self.device)
 
     def setup(self, stage: str) -> None:

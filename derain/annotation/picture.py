@@ -8,6 +8,7 @@ from matplotlib.patches import Patch, Polygon
 from numpy.typing import ArrayLike, NDArray
 
 from derain.annotation.scene import Scene
+from derain.annotation.steps import CLASS_NAMES
 from derain.fusion import UNKNOWN
 from derain.pictures.scan_pictures import legend_below, scatter, titled_figure
 from derain.scan import Scan
@@ -56,9 +57,8 @@ def annotation_figure(scan: Scan, label: NDArray[np.int64], scene: Scene, title:
 
 def _legend(label: NDArray[np.int64]) -> list[Patch]:
     counts = np.bincount(label, minlength=UNKNOWN + 1)
-    names = {kind.value: kind.name.lower() for kind in TrackClass} | {UNKNOWN: "unknown"}
     return [
-        Patch(color=colour, label=f"{names[kind]} {counts[kind]:,}")
+        Patch(color=colour, label=f"{CLASS_NAMES[kind]} {counts[kind]:,}")
         for kind, colour in CLASS_COLOURS.items()
         if counts[kind]
     ]

@@ -221,7 +221,7 @@ def _polygon(entry: Entry) -> Polygon:
 
 
 def _box(entry: Entry) -> Box:
-    parsers = {"class": _class, "centre": _triple, "size": _size, "heading": Entry.number}
+    parsers = {"class": _class, "centre": _position, "size": _size, "heading": Entry.number}
     values = entry.record(parsers, required=["class", "centre", "size"])
     return Box(values.pop("class"), **values)
 
@@ -234,7 +234,7 @@ def _corrections(entry: Entry) -> dict[str, Correction]:
 
 
 def _correction(entry: Entry) -> Correction:
-    parsers = {"shift": _triple, "size": _size, "heading": Entry.number}
+    parsers = {"shift": _position, "size": _size, "heading": Entry.number}
     return Correction(**entry.record(parsers))
 
 
@@ -242,14 +242,12 @@ def _class(entry: Entry) -> TrackClass:
     return CLASS_BY_NAME[entry.one_of(CLASS_BY_NAME)]
 
 
-def _triple(entry: Entry) -> Triple:
-    x, y, z = entry.numbers(3, _metres)
-    return x, y, z
+def _position(entry: Entry) -> tuple[float, ...]:
+    return entry.numbers(3, _metres)
 
 
-def _size(entry: Entry) -> Triple:
-    length, width, height = entry.numbers(3, _length)
-    return length, width, height
+def _size(entry: Entry) -> tuple[float, ...]:
+    return entry.numbers(3, _length)
 
 
 def _metres(entry: Entry) -> float:

@@ -30,6 +30,9 @@ from derain.scan import Scan
 from derain.simulation.classes import TrackClass
 from derain.system.open3d_import import import_open3d
 
+# Names of the labels, by id.
+CLASS_NAMES = {kind.value: kind.name.lower() for kind in TrackClass} | {UNKNOWN: "unknown"}
+
 NO_BOX = -1
 
 # More than the rounding errors of a box's corners, metres.

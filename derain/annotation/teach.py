@@ -70,16 +70,11 @@ class LabelledScan:
     """
 
     frame: Frame
-    answers: Answers = field(default_factory=Answers.none)
+    answers: Answers = field(default_factory=Answers)
     milliseconds: Mapping[str, float] = field(default_factory=dict)
     truth: Sequence[NDArray[np.int64]] | None = None
     issues: Sequence[ScanIssue] = ()
     error: InputError | None = None
-
-    @property
-    def name(self) -> str:
-        """File of the scan."""
-        return self.frame.name
 
     @property
     def is_known(self) -> bool:
@@ -290,11 +285,8 @@ def write_card(path: Path, teacher: str, scans: DataCard | None) -> None:
         "licence": f"derived from scans whose licence is {(scans or TAUGHT_CARD).licence}",
     }
     if scans is not None:
-        card |= {
-            "intensity_unit": scans.intensity_unit,
-            "simulated": scans.simulated,
-            "deduplicate": scans.deduplicate,
-        }
+        for name in ("intensity_unit", "simulated", "deduplicate"):
+            card[name] = getattr(scans, name)
     with replacing(path) as temporary:
         temporary.write_text(yaml.safe_dump(card, sort_keys=False, allow_unicode=True), "utf-8")
 

@@ -19,6 +19,7 @@ Parsed = TypeVar("Parsed")
 # What follows for scans from the names of their folders, from the least to the most:
 # nothing, what their classes are called, or also which of the classes are rain.
 AutoDetect = Literal["nothing", "classes", "rain"]
+AUTO_DETECTIONS: tuple[AutoDetect, ...] = get_args(AutoDetect)
 
 # What mean and std are of, in their order.
 CHANNELS_OF_STATISTICS = ("x", "y", "z", "intensity")
@@ -145,14 +146,8 @@ class DataCard:
 
     def normalised_as(self, other: "DataCard") -> "DataCard":
         """The same card with the input's statistics of another one, and the unit they are in."""
-        return replace(
-            self,
-            intensity_unit=other.intensity_unit,
-            mean=other.mean,
-            std=other.std,
-            range=other.range,
-            extra=dict(other.extra),
-        )
+        names = ("intensity_unit", "mean", "std", "range", "extra")
+        return replace(self, **{name: getattr(other, name) for name in names})
 
     def completed(
         self, extra: Mapping[str, tuple[float, float]] = {}, **statistics: Any
@@ -189,10 +184,7 @@ def load_card(name: str | Path) -> DataCard:
     Raises:
         InputError: No such card, or a file that is not one.
     """
-    return _card(Entry.of_yaml(packaged_or_own(name, packaged_cards(), "data card")))
-
-
-def _card(document: Entry) -> DataCard:
+    document = Entry.of_yaml(packaged_or_own(name, packaged_cards(), "data card"))
     channels = len(CHANNELS_OF_STATISTICS)
     parsers: dict[str, Callable[[Entry], Any]] = {
         "name": Entry.text,
@@ -210,8 +202,8 @@ def _card(document: Entry) -> DataCard:
         "deduplicate": Entry.truth,
         "split": lambda entry: entry.each(Entry.texts),
         "layout": Layout.of,
-        "auto_detect": _auto_detect,
-        "folders_tell": _auto_detect,  # its name in earlier versions
+        "auto_detect": lambda entry: entry.one_of(AUTO_DETECTIONS),
+        "folders_tell": lambda entry: entry.one_of(AUTO_DETECTIONS),  # its name in earlier versions
     }
     found = document.record(parsers, required=["name", "classes", "rain"])
     if "folders_tell" in found:
@@ -249,8 +241,3 @@ def _mean_and_deviation(entry: Entry) -> tuple[float, ...]:
 
 def _if_known(parser: Callable[[Entry], Parsed]) -> Callable[[Entry], Parsed | None]:
     return lambda entry: None if entry.value is None else parser(entry)
-
-
-def _auto_detect(entry: Entry) -> AutoDetect:
-    known: tuple[AutoDetect, ...] = get_args(AutoDetect)
-    return entry.one_of(known)

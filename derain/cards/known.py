@@ -3,12 +3,10 @@
 from collections.abc import Collection, Iterable, Iterator
 from functools import cache
 from pathlib import Path
-from typing import get_args
 
-from derain.cards.card import AutoDetect, DataCard, load_card, packaged_cards
+from derain.cards.card import AUTO_DETECTIONS, AutoDetect, DataCard, load_card, packaged_cards
 from derain.cards.layout import Layout
-from derain.files.labels import LABEL, label_beside
-from derain.files.names import scan_stem
+from derain.files.labels import label_beside
 
 # The usual folder of labels; where it is the layout's, they may lie beside the scans instead.
 USUAL_LABELS = Layout().labels
@@ -16,14 +14,13 @@ USUAL_LABELS = Layout().labels
 
 def cards_naming(ids: Collection[int]) -> list[str]:
     """Names of the packaged data cards that have all of some ids among their classes."""
-    cards = {name: load_card(name) for name in packaged_cards()}
-    return [name for name, card in cards.items() if set(ids) <= card.classes.keys()]
+    return [name for name, card in _packaged().items() if set(ids) <= card.classes.keys()]
 
 
 @cache
 def known_layouts() -> tuple[Layout, ...]:
     """The layouts of the packaged data cards, those first from whose folders most follows."""
-    cards = sorted(_packaged(), key=lambda card: _rank(card.auto_detect), reverse=True)
+    cards = sorted(_packaged().values(), key=lambda card: _rank(card.auto_detect), reverse=True)
     return tuple(dict.fromkeys(card.layout for card in cards))
 
 
@@ -37,7 +34,7 @@ def card_by_folders(layout: Layout, least: AutoDetect) -> DataCard | None:
     Returns:
         The card from whose folders so much follows; None without one.
     """
-    cards = [card for card in _packaged() if card.layout.scans == layout.scans]
+    cards = [card for card in _packaged().values() if card.layout.scans == layout.scans]
     return next((card for card in cards if _rank(card.auto_detect) >= _rank(least)), None)
 
 
@@ -55,12 +52,10 @@ def label_of(scan: Path, layouts: Iterable[Layout] | None = None) -> Path:
         layouts: Those that it may have, the likeliest first; by default those of the packaged data
             cards.
     """
-    folder = scan.absolute().parent
+    place = scan.absolute()
     known = known_layouts() if layouts is None else layouts
-    labels = next((layout.labels for layout in known if layout.scans == folder.name), USUAL_LABELS)
-    if labels == USUAL_LABELS:
-        return label_beside(scan)
-    return folder.parent / labels / f"{scan_stem(scan)}{LABEL}"
+    layout = next((layout for layout in known if layout.scans == place.parent.name), Layout())
+    return label_beside(scan) if layout.labels == USUAL_LABELS else layout.label_of(place)
 
 
 def label_places(scan: Path) -> Iterator[Path]:
@@ -77,10 +72,10 @@ def lidar_folders() -> tuple[str, ...]:
 
 
 @cache
-def _packaged() -> tuple[DataCard, ...]:
-    return tuple(map(load_card, packaged_cards()))
+def _packaged() -> dict[str, DataCard]:
+    return {name: load_card(name) for name in packaged_cards()}
 
 
 def _rank(detected: AutoDetect) -> int:
     """Rank of folder names by how much follows from them, from the least to the most."""
-    return get_args(AutoDetect).index(detected)
+    return AUTO_DETECTIONS.index(detected)

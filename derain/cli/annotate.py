@@ -43,16 +43,13 @@ from derain.cards.known import lidar_folders
 from derain.cli.options import add_columns, factor
 from derain.cli.outputs import folder_sink, print_lines
 from derain.errors import InputError
-from derain.fusion import LABEL_WITHIN, UNKNOWN, transfer_labels
-from derain.simulation.classes import TrackClass
+from derain.fusion import LABEL_WITHIN, transfer_labels
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.sources.sink import FolderSink
 from derain.sources.source import Source
 from derain.sources.spread import evenly_spaced
 from derain.system.extras import MATPLOTLIB, OPEN3D, require
-
-CLASS_NAMES = {kind.value: kind.name.lower() for kind in TrackClass} | {UNKNOWN: "unknown"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -89,7 +86,7 @@ def main(arguments: argparse.Namespace) -> int:
     require("annotate", OPEN3D, MATPLOTLIB)
     from derain.annotation.picture import annotation_figure
     from derain.annotation.scene import read_scene
-    from derain.annotation.steps import SCANS_OF_A_PLANE, annotate, road_plane
+    from derain.annotation.steps import CLASS_NAMES, SCANS_OF_A_PLANE, annotate, road_plane
     from derain.pictures.scan_pictures import save
 
     folders = [

@@ -1,13 +1,13 @@
 """A teacher's answers and its student's, by range, and measured by labels that lie beside them."""
 
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from derain.cards.card import DataCard
-from derain.evaluation.counts import Counts, RainCounts, band_names, band_of, ratio, table_of
+from derain.evaluation.counts import Counts, Mask, RainCounts, band_names, band_of, ratio, table_of
 from derain.evaluation.text_tables import number_text, plain_table
 from derain.scan import Scan
 from derain.sources.frame import Frame
@@ -22,9 +22,6 @@ TEACHERS_ANSWERS = {NOT_RAIN: "not rain", RAIN: "rain", NOT_KNOWN: "not known"}
 FINE_EDGES = tuple(range(0, 85, 5))
 
 _SHAPE = (len(FINE_EDGES), len(TEACHERS_ANSWERS), 2)
-
-# Which points of a scan of N points, bool (N,).
-Mask = NDArray[np.bool_]
 
 # What a teacher's answers are measured on.
 OF_TEACHER = ("all points", "points it is sure of")
@@ -51,14 +48,13 @@ class Answers:
     Attributes:
         table: Points, int64 (bands of ``FINE_EDGES``, answers of the teacher, 2); of the last axis
             the second counts what the student calls rain. Without a student, all are in the first.
+            By default there are none.
     """
 
-    table: NDArray[np.int64]
+    table: NDArray[np.int64] = field(default_factory=lambda: np.zeros(_SHAPE, np.int64))
 
     @classmethod
-    def of(
-        cls, scan: Scan, card: DataCard, called_rain: NDArray[np.bool_] | None = None
-    ) -> "Answers":
+    def of(cls, scan: Scan, card: DataCard, called_rain: Mask | None = None) -> "Answers":
         """Counts the valid points of one scan.
 
         Args:
@@ -74,11 +70,6 @@ class Answers:
         valid = scan.valid
         band = band_of(scan.range[valid], FINE_EDGES)
         return cls(table_of((band, answer[valid], student[valid].astype(np.int64)), _SHAPE))
-
-    @classmethod
-    def none(cls) -> "Answers":
-        """Counts of no points."""
-        return cls(np.zeros(_SHAPE, np.int64))
 
     def __add__(self, other: "Answers") -> "Answers":
         """Counts of the points of both."""
@@ -135,19 +126,17 @@ class AnswersOfScan:
     """The answers of one scan.
 
     Attributes:
-        key: Key of the scan.
         held_out: True if the student did not learn from it, but is chosen and measured by it.
         answers: The answers.
     """
 
-    key: str
     held_out: bool
     answers: Answers
 
 
 def total(answers: Sequence[Answers]) -> Answers:
     """Counts of the points of all."""
-    return sum(answers, Answers.none())
+    return sum(answers, Answers())
 
 
 def coarse_bands(answers: Answers) -> dict[str, Answers]:
@@ -174,9 +163,7 @@ class TruthRecord:
     def __init__(self, card: DataCard, titles: Sequence[str] = OF_TEACHER) -> None:
         self.card = card
         self.scans = 0
-        self.counts = {
-            title: RainCounts(card.classes, card.rain, unknown=card.unknown) for title in titles
-        }
+        self.counts = {title: RainCounts(card) for title in titles}
 
     def add(self, frame: Frame, scan: Scan, *answers: tuple[Mask, Mask]) -> None:
         """Measures the answers to one scan.

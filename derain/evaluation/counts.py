@@ -8,8 +8,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.scan import Scan
+
+# Which points of a scan of N points, bool (N,).
+Mask = NDArray[np.bool_]
 
 SCORES = ("precision", "recall", "f1", "iou")
 
@@ -90,7 +94,7 @@ class Counts:
     true_negative: int = 0
 
     @classmethod
-    def of(cls, called_rain: NDArray[np.bool_], rain: NDArray[np.bool_]) -> "Counts":
+    def of(cls, called_rain: Mask, rain: Mask) -> "Counts":
         """Counts points.
 
         Args:
@@ -189,10 +193,7 @@ class RainCounts:
     :class:`~derain.evaluation.metrics.RainMetrics` adds them up across processes during training.
 
     Args:
-        classes: Name of every semantic class, by id.
-        rain: Ids of the classes that count as rain.
-        unknown: Ids of the classes that are left out, because it is not known whether they are
-            rain.
+        card: Data card of the scans. Points of a class that it calls unknown are left out.
 
     Attributes:
         cells: Points by class, by band of range and by whether they are called rain, int64
@@ -203,19 +204,17 @@ class RainCounts:
         InputError: Two classes of one name, or rain that is no known class.
     """
 
-    def __init__(
-        self, classes: Mapping[int, str], rain: Collection[int], unknown: Collection[int] = ()
-    ) -> None:
-        classes = {id_: name for id_, name in classes.items() if id_ not in unknown}
-        _check_classes(classes, rain)
-        self.unknown = [*unknown]
+    def __init__(self, card: DataCard) -> None:
+        self.card = card
+        classes = {id_: name for id_, name in card.classes.items() if id_ not in card.unknown}
+        _check_classes(classes, card.rain)
         self.ids = np.array(sorted(classes), np.int64)
         self.names = [classes[id_] for id_ in self.ids.tolist()]
-        self.is_rain = np.isin(self.ids, [*rain])
+        self.is_rain = np.isin(self.ids, card.rain)
         self.cells = np.zeros((len(self.ids), len(RANGE_EDGES), 2), np.int64)
         self.per_scan: list[Counts] = []
 
-    def add(self, scan: Scan, called_rain: NDArray[np.bool_]) -> None:
+    def add(self, scan: Scan, called_rain: Mask) -> None:
         """Counts the points of one labelled scan.
 
         Args:
@@ -226,9 +225,8 @@ class RainCounts:
         Raises:
             InputError: A scan without labels, or a label that is no class.
         """
-        if scan.label is None:
-            raise InputError(scan.name, "it has no labels", "Give its label file.")
-        known = ~np.isin(scan.label, self.unknown)
+        known = ~self.card.unknown_of(scan)
+        assert scan.label is not None  # the line above refuses a scan without labels
         row, band = self._class_rows(scan.label[known]), band_of(scan.range[known])
         self.add_cells(table_of((row, band, called_rain[known].astype(np.int64)), self.cells.shape))
 

@@ -1,6 +1,5 @@
 """Rain counts as a metric of torchmetrics, which adds them up across the processes of a run."""
 
-from collections.abc import Collection, Mapping
 from dataclasses import astuple
 
 import numpy as np
@@ -10,6 +9,7 @@ from torch import Tensor
 from torchmetrics import Metric
 from torchmetrics.utilities import dim_zero_cat
 
+from derain.cards.card import DataCard
 from derain.evaluation.counts import SCORES, Counts, RainCounts, mean_over_scans
 from derain.scan import Scan
 
@@ -18,10 +18,7 @@ class RainMetrics(Metric):
     """Precision, recall, F1 and IoU of rain, from exact counts by scan, class and range.
 
     Args:
-        classes: Name of every semantic class, by id.
-        rain: Ids of the classes that count as rain.
-        unknown: Ids of the classes that are left out, because it is not known whether they are
-            rain.
+        card: Data card of the scans. Points of a class that it calls unknown are left out.
 
     Raises:
         InputError: Two classes of one name, or rain that is no known class.
@@ -34,12 +31,10 @@ class RainMetrics(Metric):
     cells: Tensor
     per_scan: list[Tensor]
 
-    def __init__(
-        self, classes: Mapping[int, str], rain: Collection[int], unknown: Collection[int] = ()
-    ) -> None:
+    def __init__(self, card: DataCard) -> None:
         super().__init__()
-        self._classes = classes, rain, unknown
-        cells = torch.from_numpy(RainCounts(*self._classes).cells)
+        self.card = card
+        cells = torch.from_numpy(RainCounts(card).cells)
         self.add_state("cells", cells, dist_reduce_fx="sum")
         self.add_state("per_scan", [], dist_reduce_fx="cat")
         self.reset()
@@ -60,7 +55,7 @@ class RainMetrics(Metric):
         Raises:
             InputError: A scan without labels, or a label that is no class.
         """
-        counts = RainCounts(*self._classes)
+        counts = RainCounts(self.card)
         counts.add(scan, called_rain)
         self.cells += torch.from_numpy(counts.cells).to(self.device)
         self.per_scan.append(self.cells.new_tensor([astuple(counts.pooled())]))
@@ -88,7 +83,7 @@ class RainMetrics(Metric):
             return self._counts()
 
     def _counts(self) -> RainCounts:
-        counts = RainCounts(*self._classes)
+        counts = RainCounts(self.card)
         counts.cells = self.cells.cpu().numpy().copy()
         counts.per_scan = [Counts(*row) for row in dim_zero_cat(self.per_scan).tolist()]
         return counts

@@ -87,21 +87,6 @@ class OperatingPoints:
         hits, false = int(self.true_positive[number]), int(self.false_positive[number])
         return Counts(hits, false, self.rain - hits, self.other - false)
 
-    def among(self, thresholds: NDArray[np.float64]) -> "OperatingPoints":
-        """The same counts at some of the thresholds.
-
-        Args:
-            thresholds: Some of them, rising, float64 (S,).
-        """
-        rows = np.searchsorted(self.thresholds, thresholds)
-        return OperatingPoints(
-            self.thresholds[rows],
-            self.true_positive[rows],
-            self.false_positive[rows],
-            self.rain,
-            self.other,
-        )
-
 
 class ThresholdCounts(Metric):
     """Counts probabilities of rain between thresholds, in int64 and constant memory.

@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple
 from itertools import repeat
 from typing import Any
 
@@ -19,28 +19,88 @@ from derain.views.morton import first_rows
 ScoredMethod = Callable[[Scan], NDArray[np.bool_]]
 
 
-@dataclass(frozen=True)
 class Scores:
-    """Counts of the points of all scans.
+    """Counts of the answers of one method, scan after scan.
+
+    Args:
+        card: Data card of the scans.
 
     Attributes:
-        pooled: All points together.
-        per_scan: Those of each scan, in order.
-        by_class: Each semantic class, by name.
-        by_range: Each band of range, by names such as ``0-10 m``.
-        by_rain_rate: Scans of one rain rate, by names such as ``25 mm/h``; empty where none is
-            known.
+        counts: The points of all scans, by class and by range.
         by_sensor: Points of the LiDAR and of the radar; empty where they are not distinguished.
         failures: Errors, by the scan's name. In such a scan, no point counts as called rain.
     """
 
-    pooled: Counts
-    per_scan: Sequence[Counts]
-    by_class: Mapping[str, ClassCounts]
-    by_range: Mapping[str, Counts]
-    by_rain_rate: Mapping[str, Counts]
-    by_sensor: Mapping[str, Counts]
-    failures: Mapping[str, str]
+    def __init__(self, card: DataCard) -> None:
+        self.counts = RainCounts(card)
+        self.by_sensor: defaultdict[str, Counts] = defaultdict(Counts)
+        self.failures: dict[str, str] = {}
+        self._by_rate: defaultdict[float, Counts] = defaultdict(Counts)
+
+    @property
+    def pooled(self) -> Counts:
+        """All points together."""
+        return self.counts.pooled()
+
+    @property
+    def per_scan(self) -> Sequence[Counts]:
+        """The points of each scan, in order."""
+        return self.counts.per_scan
+
+    @property
+    def by_class(self) -> Mapping[str, ClassCounts]:
+        """Each semantic class, by name."""
+        return self.counts.by_class()
+
+    @property
+    def by_range(self) -> Mapping[str, Counts]:
+        """Each band of range, by names such as ``0-10 m``."""
+        return self.counts.by_range()
+
+    @property
+    def by_rain_rate(self) -> Mapping[str, Counts]:
+        """Scans of one rain rate, by names such as ``25 mm/h``; empty where none is known."""
+        return {f"{rate:g} mm/h": counts for rate, counts in sorted(self._by_rate.items())}
+
+    def judge(
+        self, method: ScoredMethod, scan: Scan, counted: NDArray[np.int64], rate: float | None
+    ) -> None:
+        """Judges a whole scan, and counts some of its rows."""
+        try:
+            predicted = method(scan)
+        except Exception as error:  # its row states whatever a library raises
+            self.failures[scan.name] = reason_of(error)
+            predicted = np.zeros(len(scan), bool)
+        scan, predicted = scan.take(counted), predicted[counted]
+        self.counts.add(scan, predicted)
+        if rate is not None:
+            self._by_rate[rate] += self.counts.per_scan[-1]
+        if scan.radar is not None:
+            card = self.counts.card
+            rain, known = card.rain_of(scan), ~card.unknown_of(scan)
+            for sensor, points in {"LiDAR": ~scan.radar, "radar": scan.radar}.items():
+                rows = known & points
+                self.by_sensor[sensor] += Counts.of(predicted[rows], rain[rows])
+
+    def to_json(self) -> dict[str, Any]:
+        """The counts so far, as :meth:`add` takes them."""
+        return {
+            "cells": self.counts.cells.tolist(),
+            "per_scan": [astuple(counts) for counts in self.counts.per_scan],
+            "by_rain_rate": [[rate, *astuple(each)] for rate, each in self._by_rate.items()],
+            "by_sensor": [[sensor, *astuple(each)] for sensor, each in self.by_sensor.items()],
+            "failures": self.failures,
+        }
+
+    def add(self, later: Mapping[str, Any]) -> None:
+        """Adds the counts of later scans, which may come from another process."""
+        self.counts.cells += np.array(later["cells"], np.int64)
+        self.counts.per_scan += [Counts(*counts) for counts in later["per_scan"]]
+        for rate, *counts in later["by_rain_rate"]:
+            self._by_rate[rate] += Counts(*counts)
+        for sensor, *counts in later["by_sensor"]:
+            self.by_sensor[sensor] += Counts(*counts)
+        self.failures |= later["failures"]
 
 
 def score(
@@ -66,87 +126,9 @@ def score(
         InputError: A scan that cannot be read, one without labels, or a label that is no class of
             the card. A method that fails is noted in its scores.
     """
-    counted = scorings(methods, scans, card, distinct, rain_rates)
-    return [scoring.scores() for scoring in counted]
-
-
-def scorings(
-    methods: Sequence[ScoredMethod],
-    scans: Iterable[Scan],
-    card: DataCard,
-    distinct: bool = False,
-    rain_rates: Sequence[float | None] | None = None,
-) -> "list[Scoring]":
-    """Counts the answers of every method to every scan; see :func:`score`."""
-    counts_of = [Scoring(card) for _ in methods]
+    scores = [Scores(card) for _ in methods]
     for scan, rate in zip(scans, repeat(None) if rain_rates is None else rain_rates, strict=False):
         counted = first_rows(scan) if distinct else np.arange(len(scan))
-        for method, scoring in zip(methods, counts_of, strict=True):
-            scoring.judge(method, scan, counted, rate)
-    return counts_of
-
-
-class Scoring:
-    """Counts the answers of one method, scan after scan.
-
-    Args:
-        card: Data card of the scans.
-    """
-
-    def __init__(self, card: DataCard) -> None:
-        self.card = card
-        self.counts = RainCounts(card.classes, card.rain, unknown=card.unknown)
-        self.by_rain_rate: defaultdict[float, Counts] = defaultdict(Counts)
-        self.by_sensor: defaultdict[str, Counts] = defaultdict(Counts)
-        self.failures: dict[str, str] = {}
-
-    def judge(
-        self, method: ScoredMethod, scan: Scan, counted: NDArray[np.int64], rate: float | None
-    ) -> None:
-        """Judges a whole scan, and counts some of its rows."""
-        try:
-            predicted = method(scan)
-        except Exception as error:  # its row states whatever a library raises
-            self.failures[scan.name] = reason_of(error)
-            predicted = np.zeros(len(scan), bool)
-        scan, predicted = scan.take(counted), predicted[counted]
-        self.counts.add(scan, predicted)
-        if rate is not None:
-            self.by_rain_rate[rate] += self.counts.per_scan[-1]
-        if scan.radar is not None:
-            rain, known = self.card.rain_of(scan), ~self.card.unknown_of(scan)
-            for sensor, points in {"LiDAR": ~scan.radar, "radar": scan.radar}.items():
-                rows = known & points
-                self.by_sensor[sensor] += Counts.of(predicted[rows], rain[rows])
-
-    def to_json(self) -> dict[str, Any]:
-        """The counts so far, as :meth:`add` takes them."""
-        return {
-            "cells": self.counts.cells.tolist(),
-            "per_scan": [astuple(counts) for counts in self.counts.per_scan],
-            "by_rain_rate": [[rate, *astuple(each)] for rate, each in self.by_rain_rate.items()],
-            "by_sensor": [[sensor, *astuple(each)] for sensor, each in self.by_sensor.items()],
-            "failures": self.failures,
-        }
-
-    def add(self, later: Mapping[str, Any]) -> None:
-        """Adds the counts of later scans, which may come from another process."""
-        self.counts.cells += np.array(later["cells"], np.int64)
-        self.counts.per_scan += [Counts(*counts) for counts in later["per_scan"]]
-        for rate, *counts in later["by_rain_rate"]:
-            self.by_rain_rate[rate] += Counts(*counts)
-        for sensor, *counts in later["by_sensor"]:
-            self.by_sensor[sensor] += Counts(*counts)
-        self.failures |= later["failures"]
-
-    def scores(self) -> Scores:
-        """The counts so far."""
-        return Scores(
-            self.counts.pooled(),
-            self.counts.per_scan,
-            self.counts.by_class(),
-            self.counts.by_range(),
-            {f"{rate:g} mm/h": self.by_rain_rate[rate] for rate in sorted(self.by_rain_rate)},
-            self.by_sensor,
-            self.failures,
-        )
+        for method, of_method in zip(methods, scores, strict=True):
+            of_method.judge(method, scan, counted, rate)
+    return scores

@@ -22,7 +22,7 @@ from derain.evaluation.answers import (
     coarse_bands,
     total,
 )
-from derain.evaluation.counts import ratio
+from derain.evaluation.counts import Mask, ratio
 from derain.pictures.palette import OUTCOMES
 from derain.pictures.scan_pictures import (
     draw_from_above,
@@ -102,9 +102,7 @@ def removed_figure(held_out: Answers, title: str) -> Figure:
     return figure
 
 
-def answers_figure(
-    scan: Scan, card: DataCard, called_rain: NDArray[np.bool_], title: str
-) -> Figure:
+def answers_figure(scan: Scan, card: DataCard, called_rain: Mask, title: str) -> Figure:
     """A scan from above by its teacher's labels, by its student, and where they differ.
 
     Args:
@@ -146,7 +144,7 @@ def answers_figure(
     return figure
 
 
-def _reach(scan: Scan, rain: NDArray[np.bool_]) -> float:
+def _reach(scan: Scan, rain: Mask) -> float:
     """Half the height of a picture that shows most of the rain, metres."""
     ranges = scan.range[rain & scan.valid]
     return max(LEAST_REACH, 1.3 * float(np.percentile(ranges, 95))) if len(ranges) else FAR

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -14,10 +15,12 @@ from derain.pictures.scan_pictures import legend_below, titled_figure
 CLEAN, UNKNOWN = "#c9b458", "#9aa3ad"
 LIGHTEST, HEAVIEST = 0.35, 0.95
 
+# Counts, and colours, by rain rate in mm/h; None where the rate is unknown.
+CountsByRate = Mapping[float | None, Contents]
+ColourByRate = Mapping[float | None, Any]
 
-def statistics_figure(
-    contents: Mapping[float | None, Contents], classes: Mapping[int, str], title: str
-) -> Figure:
+
+def statistics_figure(contents: CountsByRate, classes: Mapping[int, str], title: str) -> Figure:
     """Share of the sequences, and points of each class on a logarithmic axis, by rain rate.
 
     Args:
@@ -36,17 +39,13 @@ def statistics_figure(
     return figure
 
 
-def _colours(contents: Mapping[float | None, Contents]) -> dict[float | None, Any]:
-    from matplotlib import colormaps
-
+def _colours(contents: CountsByRate) -> ColourByRate:
     rates = [rate for rate in contents if rate]
     shades = colormaps["Blues"](np.linspace(LIGHTEST, HEAVIEST, len(rates)))
     return {None: UNKNOWN, 0.0: CLEAN, **dict(zip(rates, shades, strict=True))}
 
 
-def _draw_shares(
-    axes: Axes, contents: Mapping[float | None, Contents], colours: Mapping[float | None, Any]
-) -> None:
+def _draw_shares(axes: Axes, contents: CountsByRate, colours: ColourByRate) -> None:
     sequences = {rate: found.sequences for rate, found in contents.items()}
     total = sum(sequences.values())
     labels = [f"{rate_name(rate)}: {part / total:.0%}" for rate, part in sequences.items()]
@@ -57,10 +56,7 @@ def _draw_shares(
 
 
 def _draw_points(
-    axes: Axes,
-    contents: Mapping[float | None, Contents],
-    classes: Mapping[int, str],
-    colours: Mapping[float | None, Any],
+    axes: Axes, contents: CountsByRate, classes: Mapping[int, str], colours: ColourByRate
 ) -> None:
     ids = sorted({id_ for found in contents.values() for id_ in found.labelled})
     width = 0.8 / max(len(contents), 1)

@@ -12,7 +12,7 @@ from derain.evaluation.counts import ClassCounts
 from derain.evaluation.operating_points import OperatingPoints
 from derain.evaluation.text_tables import number_text
 from derain.pictures.palette import LOST, MISSED
-from derain.pictures.scan_pictures import legend_below
+from derain.pictures.scan_pictures import legend_below, titled_figure
 
 # Shares with the darkest and the lightest colour: errors span decades.
 DARKEST, LIGHTEST = 1.0, 1e-4
@@ -69,8 +69,7 @@ def operating_points_figure(points: OperatingPoints, threshold: float, title: st
         threshold: The chosen threshold.
         title: Heading.
     """
-    figure = Figure(figsize=(12, 4.8), layout="constrained")
-    figure.suptitle(title, fontsize=11)
+    figure = titled_figure(12, 4.8, title, fontsize=11)
     curve, thresholds = figure.subplots(1, 2)
     chosen, best = points.at(threshold), points.best
     _draw_curve(curve, points, chosen, best)

@@ -75,7 +75,8 @@ def write_playback(
                         del missing[frame.key]
                     file.flush()
             for frame in missing.values():
-                writer.write_no_judgement(title, frame)
+                place = MethodEntities(title)
+                writer.clear(frame, place.all, place.image, place.share, place.iou)
 
 
 def _write_scans(writer: "PlaybackWriter", selection: Selection, guard: Guard) -> None:
@@ -86,7 +87,7 @@ def _write_scans(writer: "PlaybackWriter", selection: Selection, guard: Guard) -
             writer.write_scan(frame)
             written += 1
         if written == before:
-            writer.write_no_scan(frame)
+            writer.clear(frame, entities.SCAN, entities.RANGES, entities.CAPTION)
         writer.file.flush()
     if not written:
         first = selection.frames[0]
@@ -171,16 +172,10 @@ class PlaybackWriter:
             self.file.log(place.image, rerun.SegmentationImage(image.astype(np.uint8)))
         self._write_share(place.share, rain, scan)
 
-    def write_no_scan(self, frame: Frame) -> None:
-        """Clears the scan, so that the one before does not stay."""
+    def clear(self, frame: Frame, *entities: str) -> None:
+        """Clears entities at a frame, so that what the frame before has there does not stay."""
         self._set_time(frame)
-        self._clear(entities.SCAN, entities.RANGES, entities.CAPTION)
-
-    def write_no_judgement(self, title: str, frame: Frame) -> None:
-        """Clears what a method found, so that its judgement of the scan before does not stay."""
-        self._set_time(frame)
-        place = MethodEntities(title)
-        self._clear(place.all, place.image, place.share, place.iou)
+        self._clear(*entities)
 
     def _write_labels(self, labels: Labels, scan: Scan, found: LabelledRain | None) -> None:
         if found is None:

@@ -93,22 +93,19 @@ def _cloud(
 
 def _images(methods: Mapping[str, Method]) -> views.Tabs:
     """The range image, and over it the result of each method."""
+    shown = {f"{title}: range image": [MethodEntities(title).image] for title in methods}
+    shown["range image"] = []
     return views.Tabs(
         *(
-            _image(f"{title}: range image", [entities.RANGES, MethodEntities(title).image])
-            for title in methods
+            views.Spatial2DView(
+                origin=entities.RANGE_IMAGE,
+                contents=[f"+ {path}" for path in (entities.RANGES, *results)],
+                name=name,
+                background=rgb(palette.BACKGROUND),
+            )
+            for name, results in shown.items()
         ),
-        _image("range image", [entities.RANGES]),
         active_tab=0,
-    )
-
-
-def _image(name: str, paths: Sequence[str]) -> views.Spatial2DView:
-    return views.Spatial2DView(
-        origin=entities.RANGE_IMAGE,
-        contents=[f"+ {path}" for path in paths],
-        name=name,
-        background=rgb(palette.BACKGROUND),
     )
 
 

@@ -39,8 +39,7 @@ class RecordingFile:
             archetypes: One or more archetypes of Rerun's.
             static: True if they hold at all times.
         """
-        first, *others = archetypes
-        self.stream.log(entity, first, *others, static=static, strict=True)
+        self.stream.log(entity, *archetypes, static=static, strict=True)
 
     def flush(self) -> None:
         """Writes everything logged so far, which bounds the memory in use.

@@ -16,7 +16,7 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from derain.errors import InputError, printable
-from derain.evaluation.counts import Counts
+from derain.evaluation.counts import Counts, Mask
 from derain.evaluation.text_tables import number_text
 from derain.files.atomic import replacing
 from derain.pictures.palette import BACKGROUND, OUTCOMES, SOLID, WITHOUT_LABELS, outcomes
@@ -41,9 +41,7 @@ MOST_PANELS_IN_A_ROW = 5
 TITLE_WIDTH = 44
 
 
-def judgement_figure(
-    scan: Scan, predicted: NDArray[np.bool_], rain: NDArray[np.bool_], title: str
-) -> Figure:
+def judgement_figure(scan: Scan, predicted: Mask, rain: Mask, title: str) -> Figure:
     """Input, truth, prediction and error of one scan, from above and as the sensor sees it.
 
     Args:
@@ -65,7 +63,7 @@ def judgement_figure(
     return figure
 
 
-def before_after_figure(scan: Scan, predicted: NDArray[np.bool_], title: str) -> Figure:
+def before_after_figure(scan: Scan, predicted: Mask, title: str) -> Figure:
     """One scan with the rain found in it, and without that rain.
 
     Args:
@@ -84,10 +82,7 @@ def before_after_figure(scan: Scan, predicted: NDArray[np.bool_], title: str) ->
 
 
 def comparison_figure(
-    scan: Scan,
-    predicted: Mapping[str, NDArray[np.bool_]],
-    rain: NDArray[np.bool_] | None,
-    title: str,
+    scan: Scan, predicted: Mapping[str, Mask], rain: Mask | None, title: str
 ) -> Figure:
     """Input, truth, and each method's result, from above and as the sensor sees it.
 
@@ -114,7 +109,7 @@ def comparison_figure(
 
 
 def _panels(
-    predicted: Mapping[str, NDArray[np.bool_]], rain: NDArray[np.bool_] | None
+    predicted: Mapping[str, Mask], rain: Mask | None
 ) -> Iterator[tuple[str, NDArray[np.int64]]]:
     if rain is not None:
         yield f"truth: {rain.sum():,} points of rain", rain.astype(np.int64)
@@ -126,9 +121,7 @@ def _panels(
             yield f"{name}: IoU {iou}", outcomes(called_rain, rain)
 
 
-def show_comparison(
-    scan: Scan, predicted: Mapping[str, NDArray[np.bool_]], rain: NDArray[np.bool_] | None
-) -> None:
+def show_comparison(scan: Scan, predicted: Mapping[str, Mask], rain: Mask | None) -> None:
     """Opens a window for each method, one after the other, in which to turn and zoom.
 
     Args:
@@ -166,10 +159,17 @@ def _no_screen() -> InputError:
     return InputError("--window", "there is no screen to open it on", "Give --out for a PNG.")
 
 
-def titled_figure(width: float, height: float, title: str) -> Figure:
-    """A figure, its size in inches, that leaves room for its heading and its legend."""
+def titled_figure(width: float, height: float, title: str, **options: Any) -> Figure:
+    """A figure that leaves room for its heading and its legend.
+
+    Args:
+        width: Its width, inches.
+        height: Its height, inches.
+        title: Heading.
+        options: Of matplotlib's ``suptitle``.
+    """
     figure = Figure(figsize=(width, height), layout="constrained")
-    figure.suptitle(title)
+    figure.suptitle(title, **options)
     return figure
 
 
@@ -303,7 +303,7 @@ def _draw_as_seen(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -> 
 
 
 def _colours(
-    scan: Scan, outcome: NDArray[np.int64] | None, rows: NDArray[np.bool_]
+    scan: Scan, outcome: NDArray[np.int64] | None, rows: Mask
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Colours, RGBA (K, 4), and the number of each point's colour, by its outcome or intensity."""
     if outcome is not None:

@@ -15,7 +15,7 @@ from derain.errors import InputError
 from derain.pictures.entities import SCAN, SHARE
 from derain.pictures.palette import shades
 from derain.scan import Scan
-from derain.sources.frame import Frame
+from derain.sources.frame import Frame, times_of
 from derain.sources.method import Method
 from derain.sources.reader import FrameReader
 from derain.sources.source import Source
@@ -89,11 +89,10 @@ class Selection:
         Raises:
             InputError: Times that are damaged.
         """
-        times = [frame.time for frame in self.frames]
-        known = [time for time in times if time is not None]
-        if len(known) < len(times) or any(before >= after for before, after in pairwise(known)):
+        times = times_of(self.frames)
+        if times is None or any(before >= after for before, after in pairwise(times)):
             return {}
-        return {f.key: time - known[0] for f, time in zip(self.frames, known, strict=True)}
+        return {f.key: time - times[0] for f, time in zip(self.frames, times, strict=True)}
 
     @cached_property
     def poses(self) -> dict[str, NDArray[np.float64]]:

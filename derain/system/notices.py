@@ -64,25 +64,8 @@ def warn(text: str) -> None:
     """
     for change in reversed(_changes):
         text = change(text)
-    for record in _records:
-        record.append(text)
     # Not print: a progress bar may be in the line.
     tqdm.write(f"derain: warning: {printable(text)}", sys.stderr)
-
-
-# Of the blocks of `recorded_warnings` that run, the innermost last.
-_records: list[list[str]] = []
-
-
-@contextmanager
-def recorded_warnings() -> Iterator[list[str]]:
-    """Lends a list of the warnings of :func:`warn`, which grows while the block runs."""
-    record: list[str] = []
-    _records.append(record)
-    try:
-        yield record
-    finally:
-        _records.pop()
 
 
 # Of the blocks of `changed_warnings` that run, the innermost last.
@@ -97,6 +80,19 @@ def changed_warnings(change: Callable[[str], str]) -> Iterator[None]:
         yield
     finally:
         _changes.pop()
+
+
+@contextmanager
+def recorded_warnings() -> Iterator[list[str]]:
+    """Lends a list of the warnings of :func:`warn`, which grows while the block runs."""
+    record: list[str] = []
+
+    def recorded(text: str) -> str:
+        record.append(text)
+        return text
+
+    with changed_warnings(recorded):
+        yield record
 
 
 @cache

@@ -59,7 +59,7 @@ def teacher_answers(data: Taught) -> list[AnswersOfScan]:
     frames.sort(key=lambda frame: (frame.sequence, frame.number))
     keys = {frame.key for frame in held_out}
     return [
-        AnswersOfScan(frame.key, frame.key in keys, _answers(data, frame))
+        AnswersOfScan(frame.key in keys, _answers(data, frame))
         for frame in tqdm(frames, "counting", disable=None)
     ]
 
@@ -111,7 +111,7 @@ def evaluate_student(
     """
     frames = evenly_spaced(data.frames("validation"), MOST_EVALUATED)
     results.evaluated = [
-        AnswersOfScan(frame.key, True, _answers(data, frame, student))
+        AnswersOfScan(True, _answers(data, frame, student))
         for frame in tqdm(frames, "evaluating", disable=None)
     ]
     for number, frame in enumerate(evenly_spaced(data.frames("validation"), DRAWN), 1):

@@ -70,13 +70,13 @@ def teach_recordings(
     for sentence in irregularities(source, method.window):
         warn(sentence)
     record = None if card is None else TruthRecord(card)
-    notices, judged, counts = Notices(), 0, Answers.none()
+    notices, judged, counts = Notices(), 0, Answers()
 
     def count(scan: LabelledScan) -> None:
         nonlocal judged, counts
         judged += 1
         counts += scan.answers
-        notices.warn(scan.name, scan.issues)
+        notices.warn(scan.frame.name, scan.issues)
         if record is not None and scan.truth is not None:
             record.add_cells(scan.truth)
         watch(scan)

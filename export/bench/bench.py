@@ -15,7 +15,7 @@ from tqdm import tqdm
 from derain.cards.card import DataCard, load_card
 from derain.cards.rain_found import warn_without_rain
 from derain.errors import reason_of
-from derain.evaluation.scores import ScoredMethod, Scoring, scorings
+from derain.evaluation.scores import ScoredMethod, Scores, score
 from derain.export.bench.bench_entries import BenchEntry, GivenMethod, TimedMethod, bench_entries
 from derain.export.bench.cost import Timing, measure_cost
 from derain.export.bench.labelled_frames import LabelledFrames
@@ -243,13 +243,12 @@ def run_bench(
         warn(note)
     timed_on = evenly_spaced(data.frames, effort.timed)
     timing = Timing(timed_on, effort.threads, effort.repeats, data.intensity_scale)
-    scored = [Scoring(data.card) for _ in methods]
+    scores = [Scores(data.card) for _ in methods]
     for of_unit in counted:
-        for scoring, counts in zip(scored, of_unit["counts"], strict=True):
-            scoring.add(counts)
+        for of_method, counts in zip(scores, of_unit["counts"], strict=True):
+            of_method.add(counts)
         for scan, method, kind, detail in of_unit["issues"]:
             notices.warn(scan, [ScanIssue(kind, detail)], method)
-    scores = [scoring.scores() for scoring in scored]
     rained = any(one.pooled.true_positive + one.pooled.false_negative for one in scores)
     warn_without_rain(rained, data.card)
     costs = [
@@ -333,12 +332,12 @@ class Counting(ValueWork[FrameUnit]):
                 yield scan
 
         rates = [self.rain_rates.get(frame.sequence) for frame in unit.frames]
-        scored = scorings(self._ready, scans(), self.reader.card, self.distinct, rates)
+        scored = score(self._ready, scans(), self.reader.card, self.distinct, rates)
         files = []
         for frame in unit.frames:
             of_scan, of_label = frame.checksums()
             files.append({"scan": frame.name, "sha256": of_scan, "label_sha256": of_label})
-        counts = [scoring.to_json() for scoring in scored]
+        counts = [scores.to_json() for scores in scored]
         return {"counts": counts, "issues": issues, "files": files}
 
     def _issues(self, name: str, scan: Scan) -> Iterator[tuple[str, str, str, str]]:

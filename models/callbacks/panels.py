@@ -192,28 +192,23 @@ class ErrorPanels(lightning.Callback):
 def errors_by_name(measured: RainCounts) -> dict[str, float]:
     """Shares that are judged wrongly, by the names of their scalars; where there are points."""
     classes = measured.by_class().items()
-    bands = measured.by_range().items()
-    return (
-        {f"{BY_CLASS}/{name}": counts.share_wrong for name, counts in classes if counts.points}
-        | {
-            f"{LEFT_BY_RANGE}/{band}": 1 - counts.recall
-            for band, counts in bands
-            if counts.true_positive + counts.false_negative
-        }
-        | {
-            f"{LOST_BY_RANGE}/{band}": counts.false_positive / others
-            for band, counts in bands
-            if (others := counts.false_positive + counts.true_negative)
-        }
-    )
+    shares = {f"{BY_CLASS}/{name}": each.share_wrong for name, each in classes if each.points}
+    bands = measured.by_range()
+    for band, counts in bands.items():
+        if counts.true_positive + counts.false_negative:
+            shares[f"{LEFT_BY_RANGE}/{band}"] = 1 - counts.recall
+    for band, counts in bands.items():
+        if others := counts.false_positive + counts.true_negative:
+            shares[f"{LOST_BY_RANGE}/{band}"] = counts.false_positive / others
+    return shares
 
 
 def _of_curve(points: OperatingPoints) -> tuple[NDArray[np.float64] | NDArray[np.int64], ...]:
     """A curve in TensorBoard's form, at thresholds from 0 to 1 in equal steps."""
-    even = points.among(CURVE_THRESHOLDS)
-    hits, false = even.true_positive, even.false_positive
+    even = np.searchsorted(points.thresholds, CURVE_THRESHOLDS)
+    hits, false = points.true_positive[even], points.false_positive[even]
     negatives, misses = points.other - false, points.rain - hits
-    return hits, false, negatives, misses, even.precision, even.recall
+    return hits, false, negatives, misses, points.precision[even], points.recall[even]
 
 
 class Dashboard(lightning.Callback):

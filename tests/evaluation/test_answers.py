@@ -75,7 +75,7 @@ def test_the_table_has_a_row_for_each_band_and_one_for_all() -> None:
     assert rows[1] == ["0-10", "m", "4", "50.0%", "50.0%", "0.0%"]
     assert rows[-1] == ["all", "12", "33.3%", "33.3%", "33.3%"]
     assert (answers + answers).rain == 4
-    assert str(Answers.none()).splitlines()[-1].split() == ["all", "0", "-", "-", "-"]
+    assert str(Answers()).splitlines()[-1].split() == ["all", "0", "-", "-", "-"]
 
 
 YARD = DataCard("yard", {0: "wall", 1: "drop", 2: "car", 9: "nobody knows"}, (1,), (9,))

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from sklearn import metrics
 
+from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.counts import SCORES, ClassCounts, Counts, RainCounts, mean_over_scans
 from derain.evaluation.metrics import RainMetrics
@@ -27,6 +28,7 @@ from ..two_returns import Recording
 
 CLASSES = {0: "ground", 3: "rain", 7: "car", 110: "snow", 255: "nobody knows"}
 RAIN = (3, 110)
+CARD = DataCard("ours", CLASSES, RAIN, unknown=(255,))
 approx = partial(pytest.approx, nan_ok=True)
 
 
@@ -70,7 +72,7 @@ def reference(truth: NDArray[np.bool_], called: NDArray[np.bool_]) -> list[float
 
 @pytest.mark.parametrize("points", [(), (0,), (1, 50, 50), (2, 2, 2, 2), (0, 40)])
 def test_scores_are_those_of_scikit_learn_and_all_counts_add_up(points) -> None:
-    counts = RainCounts(CLASSES, RAIN, unknown=[255])
+    counts = RainCounts(CARD)
     truths, answers = [np.zeros(0, bool)], [np.zeros(0, bool)]
     for scan, called in (labelled(*one) for one in enumerate(points)):
         counts.add(scan, called)
@@ -87,7 +89,7 @@ def test_scores_are_those_of_scikit_learn_and_all_counts_add_up(points) -> None:
 
 
 def test_points_are_counted_by_class_and_by_the_band_that_begins_at_an_edge() -> None:
-    counts = RainCounts(CLASSES, RAIN, unknown=[255])
+    counts = RainCounts(CARD)
     x = np.array([3, 9.99, 10, 39.9, 80, 1e9, np.inf, np.nan, 1])
     label = np.array([3, 0, 0, 3, 0, 0, 110, 7, 255])
     called = np.array([1, 1, 0, 0, 0, 1, 0, 0, 1], bool)
@@ -113,20 +115,20 @@ def test_points_are_counted_by_class_and_by_the_band_that_begins_at_an_edge() ->
 
 
 def test_what_cannot_be_counted_is_refused() -> None:
-    counts = RainCounts({0: "ground", 3: "rain"}, [3])
+    counts = RainCounts(DataCard("two", {0: "ground", 3: "rain"}, (3,)))
     scan = Scan(np.ones((1, 3), np.float32))
     with pytest.raises(InputError, match="no labels"):
         counts.add(scan, np.array([True]))
     with pytest.raises(InputError, match="id 9"):
         counts.add(scan.with_label(np.array([9])), np.array([True]))
     assert counts.per_scan == []
-    for classes, rain in (({0: "a", 1: "a"}, [0]), ({0: "a"}, [5])):
+    for classes, rain in (({0: "a", 1: "a"}, (0,)), ({0: "a"}, (5,))):
         with pytest.raises(InputError):
-            RainCounts(classes, rain)
+            RainCounts(DataCard("odd", classes, rain))
 
 
 def test_a_metric_counts_alike_in_any_precision_and_forgets_when_reset() -> None:
-    metric, expected = RainMetrics(CLASSES, RAIN, [255]), RainCounts(CLASSES, RAIN, [255])
+    metric, expected = RainMetrics(CARD), RainCounts(CARD)
     for number in range(3):
         scan, called = labelled(number, 60)
         metric.update(scan, called)

@@ -57,4 +57,5 @@ def test_a_method_that_fails_on_a_scan_finds_nothing_there_and_the_reason_is_pri
 def test_copies_of_a_point_count_once_where_that_is_asked(scans, card) -> None:
     doubled = [scan.take(np.repeat(np.arange(len(scan)), 2)) for scan in scans]
     assert score([all_points], doubled, card)[0].pooled == Counts(180, 1580, 0, 0)
-    assert score([all_points], doubled, card, distinct=True) == score([all_points], scans, card)
+    (once,) = score([all_points], doubled, card, distinct=True)
+    assert once.to_json() == score([all_points], scans, card)[0].to_json()

@@ -64,7 +64,7 @@ def test_what_is_not_known_moves_no_weight(make) -> None:
         logits = torch.zeros(view.size, 2)
         logits[of_unknown, int(model_finds_rain)] = 5.0
         logits.requires_grad_()
-        loss = model.segmentation_loss(logits, batch.target).total
+        loss = model.segmentation_loss(logits, batch.target).loss
         loss.backward()
         assert of_unknown.any()
         assert not logits.grad[of_unknown].any()

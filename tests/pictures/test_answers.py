@@ -35,7 +35,7 @@ def heights(figure: Figure, panel: int, answer: int) -> list[float]:
 
 def test_the_bars_of_a_teacher_are_its_shares_by_scan(scan) -> None:
     counted = [Answers.of(scan, CARD), Answers.of(scan.take(np.arange(0, 4000, 8)), CARD)]
-    scans = [AnswersOfScan("a", False, counted[0]), AnswersOfScan("b", True, counted[1])]
+    scans = [AnswersOfScan(False, counted[0]), AnswersOfScan(True, counted[1])]
     figure = teacher_figure(scans, "a teacher")
     assert heights(figure, 0, RAIN) == pytest.approx([0.25, 0.0])
     assert heights(figure, 0, NOT_KNOWN) == pytest.approx([0.125, 0.0])
@@ -83,7 +83,7 @@ def test_nothing_and_no_points_can_be_drawn() -> None:
     empty = Scan.of(scene(0)).with_label(np.zeros(0, np.int64))
     answers = Answers.of(empty, CARD, np.zeros(0, bool))
     for figure in (
-        teacher_figure([AnswersOfScan("empty", False, answers)], ""),
+        teacher_figure([AnswersOfScan(False, answers)], ""),
         removed_figure(answers, ""),
         answers_figure(empty, CARD, np.zeros(0, bool), ""),
     ):

@@ -31,8 +31,8 @@ def results_of(
         "outdet",
         Path("model.onnx"),
         Path("work/report.md"),
-        [AnswersOfScan(f"{n}", n >= scans - 4, taught) for n in range(scans)],
-        [] if student is None else [AnswersOfScan("last", True, student)],
+        [AnswersOfScan(n >= scans - 4, taught) for n in range(scans)],
+        [] if student is None else [AnswersOfScan(True, student)],
         **facts,
     )
 

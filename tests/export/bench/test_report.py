@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from derain.evaluation.counts import Counts, or_none
+from derain.evaluation.counts import or_none
 from derain.evaluation.scores import Scores, score
 from derain.export.bench.bench import scored_methods
 from derain.export.bench.bench_entries import FILE_SIZE, BenchEntry, bench_entries
@@ -111,7 +111,7 @@ def test_the_picture_shows_methods_with_a_time_and_an_iou_and_how_large_files_ar
 ) -> None:
     filter_, baseline, failed = rows
     of_file = replace(filter_, bench_entry=replace(filter_.bench_entry, facts={FILE_SIZE: 67_535}))
-    dry = replace(filter_, scores=replace(filter_.scores, pooled=Counts()))
+    dry = replace(filter_, scores=Scores(filter_.scores.counts.card))
     draw_speed_error([of_file, baseline, failed, dry], FACTS, tmp_path / "speed_error.png")
     ((axes,),) = [figure.axes for figure in saved_figures]
     assert [text.get_text() for text in axes.texts] == ["dror · 68 kB", "all"]

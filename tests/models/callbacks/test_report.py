@@ -13,8 +13,7 @@ from derain.scan import Scan
 
 
 def test_a_score_that_is_undefined_is_a_dash_in_text_and_null_in_json() -> None:
-    card = load_card("wads")
-    metrics = RainMetrics(card.classes, card.rain)
+    metrics = RainMetrics(load_card("wads"))
     near = Scan.of(np.tile([3.0, 0, 0], (4, 1))).with_label(np.array([0, 0, 0, 110]))
     metrics.update(near, np.zeros(4, bool))  # rain that is left
     lines = as_text(metrics, "WADS").splitlines()
@@ -28,7 +27,7 @@ def test_a_score_that_is_undefined_is_a_dash_in_text_and_null_in_json() -> None:
 def test_the_folder_is_printed_with_escapes(tmp_path, capsys) -> None:
     card, folder = load_card("wads"), tmp_path / "run\n\N{RIGHT-TO-LEFT OVERRIDE}"
     folder.mkdir()
-    metrics = RainMetrics(card.classes, card.rain)
+    metrics = RainMetrics(card)
     rain = np.arange(100) < 50
     metrics.update(Scan.of(scene(100)).with_label(np.where(rain, 110, 0)), rain)
     trainer = SimpleNamespace(
