@@ -4,7 +4,6 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import lightning
 import numpy as np
-from numpy.typing import NDArray
 from torch.utils.data import DataLoader
 
 from derain.cards.card import CHANNELS_OF_STATISTICS, DataCard
@@ -13,7 +12,6 @@ from derain.datamodules.order import Draws
 from derain.datamodules.scan_data import Loading, Part, ScanData, with_needed_labels
 from derain.errors import InputError
 from derain.learning.batch import Sample
-from derain.learning.task import Task
 from derain.scan import Scan
 from derain.sources.reader import FrameReader
 from derain.sources.source import Source
@@ -46,7 +44,6 @@ class ScanDataModule(ScanData, lightning.LightningDataModule):
     def __init__(self, card: DataCard, loading: Loading) -> None:
         lightning.LightningDataModule.__init__(self)
         ScanData.__init__(self, card, loading)
-        self.task: Task | None = None
 
     def epoch_source(self, part: Part) -> Source:
         """The scans that a loader of a part passes through: by default, each of them once.
@@ -126,15 +123,6 @@ class ScanDataModule(ScanData, lightning.LightningDataModule):
         shown = self.epoch_source(part)
         return scan_loader(shown, part, self.task, self.loading, processes, process, draws)
 
-    @property
-    def _reads_labels(self) -> bool:
-        return self.task is None or self.task.reads_labels
-
-    @property
-    def _reader(self) -> FrameReader:
-        columns = None if self.task is None else self.task.columns
-        return FrameReader(self.card, self.loading.intensity_scale, columns)
-
 
 def with_statistics(card: DataCard, scans: Iterable[Scan], extra: Sequence[str] = ()) -> DataCard:
     """Completes a data card with the statistics that it lacks.
@@ -164,7 +152,13 @@ def with_statistics(card: DataCard, scans: Iterable[Scan], extra: Sequence[str] 
         if labelled:
             rain += int(card.rain_of(scan)[rows].sum())
             judged += int((~card.unknown_of(scan)[rows]).sum())
-    _refuse_missing(extra, count[len(USUAL_CHANNELS) :])
+    for name, known in zip(extra, count[len(USUAL_CHANNELS) :], strict=True):
+        if not known:
+            raise InputError(
+                f"channel '{name}'",
+                "no training scan has a column of numbers of that name",
+                "Name columns of the scans; data.loading.columns names those of unnamed files.",
+            )
     mean = total / np.maximum(count, 1)
     variance = squares / np.maximum(count, 1) - mean**2
     # A constant channel is not divided by 0.
@@ -177,13 +171,3 @@ def with_statistics(card: DataCard, scans: Iterable[Scan], extra: Sequence[str] 
         extra={name: statistics[name] for name in extra},
         rain_share=rain / max(judged, 1) if labelled else None,
     )
-
-
-def _refuse_missing(channels: Sequence[str], count: NDArray[np.float64]) -> None:
-    for name, known in zip(channels, count, strict=True):
-        if not known:
-            raise InputError(
-                f"channel '{name}'",
-                "no training scan has a column of numbers of that name",
-                "Name columns of the scans; data.loading.columns names those of unnamed files.",
-            )

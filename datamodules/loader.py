@@ -58,7 +58,7 @@ def scan_loader(
         InputError: Labels missing where they are needed; or a network that sees several scans,
             with an augmentation that moves one of them alone.
     """
-    view = task.make_view(threads=1 if loading.workers else 0)
+    view = task.spec.make_view(threads=1 if loading.workers else 0)
     if part == "train" and loading.augmentation.moves_the_sensor and not view.window.is_one_scan:
         raise InputError(
             "augmentation",

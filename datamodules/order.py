@@ -3,17 +3,14 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence, Sized
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from torch.utils.data import DistributedSampler
+from torch.utils.data import Dataset, DistributedSampler
 
 from derain.errors import InputError
 from derain.learning.seeds import Draw, generator_of
-
-if TYPE_CHECKING:
-    from derain.datamodules.scan_dataset import ScanDataset
 
 
 class Pick(NamedTuple):
@@ -128,7 +125,7 @@ class TrainingOrder(DistributedSampler[Pick]):
     ) -> None:
         drawn = len(scans) if draws is None else sum(draws.drawn)
         # The base class only needs the number of scans.
-        super().__init__(cast("ScanDataset", range(drawn)), processes, process, seed=seed)
+        super().__init__(cast("Dataset[Any]", range(drawn)), processes, process, seed=seed)
         self.scans = len(scans)
         self.draws = draws
 
@@ -159,8 +156,8 @@ class MeasuringOrder(DistributedSampler[Pick]):
         process: Number of this process.
     """
 
-    def __init__(self, scans: "ScanDataset", batch_size: int, processes: int, process: int) -> None:
-        super().__init__(scans, processes, process, shuffle=False)
+    def __init__(self, scans: Sized, batch_size: int, processes: int, process: int) -> None:
+        super().__init__(cast("Dataset[Any]", scans), processes, process, shuffle=False)
         numbers = range(len(scans))
         batches = [
             numbers[start : start + batch_size] for start in range(0, len(numbers), batch_size)

@@ -15,6 +15,7 @@ from derain.cards.layout import Layout
 from derain.datamodules.augmentation import Augmentation
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS
+from derain.learning.task import Task
 from derain.scan import Scan
 from derain.sources.folders import sequence_frames
 from derain.sources.frame import Frame
@@ -68,7 +69,13 @@ class ScanData(ABC):
     Args:
         card: Data card of the scans.
         loading: Options for reading scans.
+
+    Attributes:
+        task: What a model and these data have agreed on before training; None where there is no
+            model, or none yet.
     """
+
+    task: Task | None = None
 
     def __init__(self, card: DataCard, loading: Loading) -> None:
         self.card = card
@@ -93,7 +100,8 @@ class ScanData(ABC):
         Raises:
             InputError: Missing folders or scans, or labels missing where they are needed.
         """
-        return with_needed_labels(self.source(part), part, self._reads_labels)
+        reads_labels = self.task is None or self.task.reads_labels
+        return with_needed_labels(self.source(part), part, reads_labels)
 
     def read(self, frame: Frame) -> Scan:
         """Reads a scan with its labels; for a model, with the columns that it sees.
@@ -112,13 +120,9 @@ class ScanData(ABC):
         return (self._reader.read_distinct if self.distinct else self._reader.read)(frame)
 
     @property
-    def _reads_labels(self) -> bool:
-        """True if training and validation need labels."""
-        return True
-
-    @property
     def _reader(self) -> FrameReader:
-        return FrameReader(self.card, self.loading.intensity_scale)
+        columns = None if self.task is None else self.task.columns
+        return FrameReader(self.card, self.loading.intensity_scale, columns)
 
 
 def with_needed_labels(source: Source, part: Part, reads_labels: bool) -> Source:

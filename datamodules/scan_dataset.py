@@ -1,7 +1,7 @@
 """Reads, augments and views the scans of a data set one by one, and keeps what stays the same."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -16,23 +16,25 @@ from derain.learning.seeds import Draw, generator_of
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
+from derain.sources.recordings import recordings_of
 from derain.sources.spread import evenly_spaced
 from derain.system.stopwatch import Stopwatch
 from derain.views.view import View, ViewedScan
-from derain.views.window import PlacedScan, Window, WindowOfScans
+from derain.views.window import PlacedScan, WindowOfScans
 
 Item = TypeVar("Item", Scan, Sample)
 
 MEGABYTE = 2**20
 
 
+@dataclass(eq=False)
 class ScanDataset(Dataset[Sample | InputError]):
     """Reads the scans of frames and views them.
 
     What stays the same is kept from epoch to epoch: the read scan where it is augmented, else its
     view. A file that changes meanwhile is not read again.
 
-    Args:
+    Attributes:
         frames: The frames.
         read: Reads the scan of a frame, as the network sees it.
         view: The network's view.
@@ -42,23 +44,16 @@ class ScanDataset(Dataset[Sample | InputError]):
         room: Bytes that may be kept; each worker has a copy of the data set and keeps as many.
     """
 
-    def __init__(
-        self,
-        frames: Sequence[Frame],
-        read: Callable[[Frame], Scan],
-        view: View,
-        reader: FrameReader,
-        augmentation: Augmentation | None = None,
-        seed: int = 0,
-        room: int = 0,
-    ) -> None:
-        self.frames = frames
-        self.read = read
-        self.view = view
-        self.reader = reader
-        self.augmentation = augmentation
-        self.seed = seed
-        self._kept = Cache(room)
+    frames: Sequence[Frame]
+    read: Callable[[Frame], Scan]
+    view: View
+    reader: FrameReader
+    augmentation: Augmentation | None = None
+    seed: int = 0
+    room: int = 0
+
+    def __post_init__(self) -> None:
+        self._kept = Cache(self.room)
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -176,23 +171,18 @@ def view_in_window(
     if window.is_one_scan:
         return view(scan)
 
-    def placed(place: int) -> PlacedScan:
-        frame = frames[place]
-        return PlacedScan(scan if place == number else read(frame), frame.time, frame.pose)
+    def placed(frame: Frame, scan: Scan) -> PlacedScan:
+        return PlacedScan(scan, frame.time, frame.pose)
 
-    first, last = _reach(frames, number, window)
-    before, after = range(first, number), range(number + 1, last + 1)
+    # The window ends at gaps in a sequence.
+    first = max(number - window.before, 0)
+    before = recordings_of(frames[first : number + 1])[-1][:-1]
+    after = recordings_of(frames[number : number + window.after + 1])[0][1:]
+    judged = placed(frames[number], scan)
     return view.of_window(
-        WindowOfScans(placed(number), [*map(placed, before)], [*map(placed, after)])
+        WindowOfScans(
+            judged,
+            [placed(frame, read(frame)) for frame in before],
+            [placed(frame, read(frame)) for frame in after],
+        )
     )
-
-
-def _reach(frames: Sequence[Frame], number: int, window: Window) -> tuple[int, int]:
-    """The first and the last frame of a window, which ends at gaps in a sequence."""
-    first = last = number
-    while first > max(number - window.before, 0) and frames[first].follows(frames[first - 1]):
-        first -= 1
-    end = min(number + window.after, len(frames) - 1)
-    while last < end and frames[last + 1].follows(frames[last]):
-        last += 1
-    return first, last

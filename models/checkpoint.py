@@ -106,11 +106,9 @@ def started(model: DerainingModule, checkpoint: Path, name: str) -> DerainingMod
     """
     source = load_model(checkpoint)
     arguments = {
-        argument: (
-            model if argument in model.RECIPE or argument not in source.hparams else source
-        ).hparams[argument]
-        for argument in model.hparams
-        if argument != "spec" and not argument.startswith("_")
+        argument: own if argument in model.RECIPE else source.hparams.get(argument, own)
+        for argument, own in _arguments(model.hparams).items()
+        if argument != "spec"
     }
     student = type(model)(**arguments)
     try:
@@ -266,20 +264,17 @@ def _check_progress(content: Mapping[str, Any], path: Path) -> None:
 
 
 def _check_loops(loops: Entry) -> None:
-    fresh = _fresh_loops()
+    """Refuses states of loops that a trainer has not, or that are not like its own."""
+    # States before there is any progress, as checkpoints have them.
+    trainer = _idle_trainer()
+    names = [f"{stage}_loop" for stage in ("fit", "validate", "test", "predict")]
+    fresh = {name: getattr(trainer, name).state_dict() for name in names}
     matching_state(loops, {name: {} for name in fresh})  # all of them are there
     for name, own in fresh.items():
         parts = loops.members()[name].members()
         for key in own.keys() & parts.keys():
             if matching_state(parts[key], own[key]) != parts[key].value:
                 raise parts[key].fault("holds more than Lightning writes", REMEDY)
-
-
-def _fresh_loops() -> dict[str, dict[str, Any]]:
-    """States of a trainer's loops before there is any progress, as checkpoints have them."""
-    trainer = _idle_trainer()
-    names = (f"{stage}_loop" for stage in ("fit", "validate", "test", "predict"))
-    return {name: getattr(trainer, name).state_dict() for name in names}
 
 
 def _idle_trainer() -> lightning.Trainer:

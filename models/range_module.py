@@ -1,11 +1,11 @@
-"""The base class of derainers on range images: their grid."""
+"""What derainers on range images share: their grid, and their pixels one by one."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from torch import Tensor
 
 from derain.errors import InputError
+from derain.models.base import DerainingModule
 from derain.scan import Scan
 from derain.views.grid_fit import fit_grid
 from derain.views.range_image import RangeView
@@ -15,28 +15,25 @@ from derain.views.spherical_grid import grid_of
 FITTED = "fitted"
 
 
-def range_view(
-    grid: str | Mapping[str, Any],
-    channels: Sequence[str],
-    back_projection: str,
-    scans: Sequence[Scan],
-) -> RangeView:
+def range_view(model: DerainingModule, scans: Sequence[Scan]) -> RangeView:
     """A view on a grid that is stated, or fitted to scans.
 
+    It goes by the model's ``grid``, which is ``fitted`` for one that fits the scans, or the name of
+    a published grid, or its bounds, as :func:`~derain.views.spherical_grid.grid_of` takes them; and
+    by its ``back_projection``.
+
     Args:
-        grid: ``fitted`` for one that fits the scans; or the name of a published grid, or its
-            bounds, as :func:`~derain.views.spherical_grid.grid_of` takes them.
-        channels: Channels of a pixel, in order.
-        back_projection: Name of the back-projection, as :class:`RangeView` takes it.
+        model: The model.
         scans: Training scans.
 
     Raises:
         InputError: An unknown grid or back-projection, or a grid to fit without scans.
     """
+    grid = model.hparams["grid"]
     if grid == FITTED and not scans:
         raise InputError("grid", "there are no scans to fit it to", "Give a grid by its name.")
     chosen = fit_grid(scans).grid if grid == FITTED else grid_of(grid, "grid")
-    return RangeView(chosen, tuple(channels), back_projection)
+    return RangeView(chosen, model.channels, model.hparams["back_projection"])
 
 
 def require_grid(grid: str | None, name: str) -> str:

@@ -88,12 +88,7 @@ class SupervisedModule(DerainingModule):
         """Loss with its parts, and logits."""
         assert batch.target is not None  # the data modules pair these scans with labels
         logits = self.logits_of(batch)
-        loss = self.segmentation_loss(logits, batch.target)
-        return {
-            "loss": loss.total,
-            "cross_entropy": loss.cross_entropy,
-            "lovasz": loss.lovasz,
-        }, logits
+        return self.segmentation_loss(logits, batch.target)._asdict(), logits
 
     def segmentation_loss(self, logits: Tensor, target: Tensor) -> SegmentationLoss:
         """Weighted cross-entropy and Lovász-softmax over the cells that hold something.

@@ -21,7 +21,7 @@ LEAST_SHARE = 1e-3
 class SegmentationLoss(NamedTuple):
     """A loss and the parts it is the sum of, each a scalar."""
 
-    total: Tensor
+    loss: Tensor
     cross_entropy: Tensor
     lovasz: Tensor
 

@@ -39,14 +39,10 @@ class MeanLosses(Metric):
         """The means, float32 scalars by name; NaN where no scan counted."""
         rows = [(values, scans) for *values, scans in dim_zero_cat(self.rows).tolist() if scans]
         total = math.fsum(scans for _, scans in rows)
-        return {
+        means = {}
+        for column, name in enumerate(self.names):
             # fsum rounds once, whatever the order.
-            name: torch.tensor(
-                math.fsum(values[column] * scans for values, scans in rows) / total
-                if rows
-                else math.nan,
-                dtype=torch.float32,
-                device=self.device,
-            )
-            for column, name in enumerate(self.names)
-        }
+            weighted = math.fsum(values[column] * scans for values, scans in rows)
+            mean = weighted / total if rows else math.nan
+            means[name] = torch.tensor(mean, dtype=torch.float32, device=self.device)
+        return means

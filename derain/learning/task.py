@@ -13,7 +13,6 @@ from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.spec import Spec
 from derain.views.channels import extra_channels
-from derain.views.view import View
 
 if TYPE_CHECKING:
     from derain.models.base import DerainingModule
@@ -40,10 +39,6 @@ class Task:
     def columns(self) -> tuple[str, ...]:
         """Columns of a scan that the network sees besides those that every scan has."""
         return extra_channels(self.spec.channels)
-
-    def make_view(self, threads: int = 0) -> View:
-        """The view that the network sees a scan through; 0 threads are those of all cores."""
-        return self.spec.make_view(threads)
 
 
 @runtime_checkable

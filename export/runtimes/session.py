@@ -1,7 +1,7 @@
 """Runtimes by name, and what each can do: it opens an exported network, and computes its scores."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -118,14 +118,15 @@ class Runtime:
 
     def __post_init__(self) -> None:
         if self.name not in RUNTIMES:
-            remedy = f"{did_you_mean(self.name, RUNTIMES)}Give {_listed(RUNTIMES)}."
+            remedy = f"{did_you_mean(self.name, RUNTIMES)}Give {' or '.join(RUNTIMES)}."
             raise InputError(short(self.name), "no such runtime", remedy)
         if self.precision not in RUNTIMES[self.name].PRECISIONS:
             able = [name for name, kind in RUNTIMES.items() if self.precision in kind.PRECISIONS]
+            other = f", or take the runtime {' or '.join(able)}" if able else ""
             raise InputError(
                 f"precision {short(self.precision)}",
-                f"{self.name} computes in {_listed(RUNTIMES[self.name].PRECISIONS)}",
-                f"Leave it out, or take the runtime {_listed(able)}." if able else "Leave it out.",
+                f"{self.name} computes in {' or '.join(RUNTIMES[self.name].PRECISIONS)}",
+                f"Leave it out{other}.",
             )
 
     def open(self, file: ModelFile, threads: int) -> Session:
@@ -149,7 +150,3 @@ class Runtime:
     def __str__(self) -> str:
         """Its name, and its precision where that is not float32."""
         return self.name if self.precision == FLOAT32_PRECISION else f"{self.name} {self.precision}"
-
-
-def _listed(names: Iterable[str]) -> str:
-    return " or ".join(names)

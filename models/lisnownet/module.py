@@ -156,8 +156,7 @@ class LiSnowNet(DerainingModule, Published):
 
     def view_for(self, scans: Sequence[Scan]) -> RangeView:
         """The view that the network sees a scan through, its grid fitted if it is not stated."""
-        grid, back_projection = self.hparams["grid"], self.hparams["back_projection"]
-        return range_view(grid, self.channels, back_projection, scans)
+        return range_view(self, scans)
 
     def rule_for(self, scans: Sequence[Scan]) -> dict[str, float]:
         """Constants of the selection rule, fitted to training scans where they are not stated."""
@@ -192,12 +191,8 @@ class LiSnowNet(DerainingModule, Published):
         loss = sparsity_loss(
             denoised, seen, valid, *(self.hparams[name] for name in ("alpha", "beta", "norm"))
         )
-        return {
-            "loss": loss.total,
-            "wavelet": loss.wavelet,
-            "fourier": loss.fourier,
-            "residual": loss.residual,
-        }, rain_logits(image, valid, seen, denoised.detach(), self.selection)
+        logits = rain_logits(image, valid, seen, denoised.detach(), self.selection)
+        return loss._asdict(), logits
 
     def on_fit_start(self) -> None:
         """Drops the images that an earlier training was fitted to."""

@@ -24,7 +24,7 @@ RESIDUALS: dict[str, Callable[[Tensor], Tensor]] = {"l1": torch.abs, "l2": torch
 class SparsityLoss(NamedTuple):
     """A loss and its parts, each a scalar."""
 
-    total: Tensor
+    loss: Tensor
     wavelet: Tensor
     fourier: Tensor
     residual: Tensor
@@ -35,7 +35,7 @@ def sparsity_loss(
 ) -> SparsityLoss:
     """Distance of denoised images from sparse ones, and from their inputs.
 
-    With w = 1 - 2^-alpha the total is w (beta wavelet + (1 - beta) fourier) + (1 - w) residual.
+    With w = 1 - 2^-alpha the loss is w (beta wavelet + (1 - beta) fourier) + (1 - w) residual.
 
     Args:
         denoised: Output of the network for the images, float (B, C, H, W), any size.

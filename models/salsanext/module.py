@@ -122,8 +122,7 @@ class SalsaNextModule(SupervisedModule):
 
     def view_for(self, scans: Sequence[Scan]) -> RangeView:
         """The view that the network sees a scan through, its grid fitted if it is not stated."""
-        grid, back_projection = self.hparams["grid"], self.hparams["back_projection"]
-        return range_view(grid, self.channels, back_projection, scans)
+        return range_view(self, scans)
 
     def forward(self, image: Tensor, valid: Tensor) -> Tensor:
         """Logits of every pixel, float (B · H · W, 2), as :class:`DeployedSalsaNext` gives them."""

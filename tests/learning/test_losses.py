@@ -97,7 +97,7 @@ def test_no_points_give_zero_and_a_gradient() -> None:
     logits = torch.zeros(0, 2, requires_grad=True)
     loss = segmentation_loss(logits, torch.zeros(0, dtype=torch.int64), torch.ones(2))
     assert [part.item() for part in loss] == [0, 0, 0]
-    assert torch.autograd.grad(loss.total, logits)[0].shape == (0, 2)
+    assert torch.autograd.grad(loss.loss, logits)[0].shape == (0, 2)
 
 
 @pytest.mark.parametrize("scale", [0.0, 1.0, 1e4], ids=["constant", "ordinary", "saturated"])
@@ -112,7 +112,7 @@ def test_value_and_gradient_are_finite(scale, target, dtype) -> None:
     logits = (scale * logits).to(dtype).requires_grad_()
     loss = segmentation_loss(logits, torch.tensor(target), torch.tensor([1.07, 14.84]))
     assert all(part.isfinite() and part >= 0 for part in loss)
-    assert torch.autograd.grad(loss.total, logits)[0].isfinite().all()
+    assert torch.autograd.grad(loss.loss, logits)[0].isfinite().all()
 
 
 def test_autocast_changes_nothing() -> None:
@@ -136,7 +136,7 @@ def test_the_loss_is_the_sum_of_the_two(seed, points, present, swapped) -> None:
     torch.testing.assert_close(short.cross_entropy, cross_entropy)
     torch.testing.assert_close(short.lovasz, lovasz)
     expected = torch.autograd.grad(cross_entropy + lovasz, logits)
-    torch.testing.assert_close(torch.autograd.grad(short.total, logits), expected)
+    torch.testing.assert_close(torch.autograd.grad(short.loss, logits), expected)
 
 
 def test_the_weight_of_a_class_that_never_occurs_is_finite() -> None:

@@ -157,7 +157,7 @@ def test_a_training_step_on_a_hard_image_is_small(case, bfloat16) -> None:
     with torch.autocast("cpu", dtype=torch.bfloat16, enabled=bfloat16):
         denoised = network(image, valid)
         loss = sparsity_loss(denoised, image, valid, alpha=5, beta=0.5)
-    loss.total.backward()
+    loss.loss.backward()
     assert denoised.dtype == torch.float32
     assert all(part.isfinite() for part in loss)
     # NaN is not below anything, either.
@@ -184,7 +184,7 @@ def test_an_image_without_variation_leaves_the_others_their_gradient() -> None:
 
 def test_the_gradient_reaches_every_parameter() -> None:
     network, (image, valid) = small(), scene(64, 64, scans=2)
-    sparsity_loss(network(image, valid), image, valid, alpha=5, beta=0.5).total.backward()
+    sparsity_loss(network(image, valid), image, valid, alpha=5, beta=0.5).loss.backward()
     for name, parameter in network.named_parameters():
         assert parameter.grad.any(), name
 

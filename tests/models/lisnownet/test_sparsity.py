@@ -49,7 +49,7 @@ def test_alpha_and_beta_weigh_the_parts(alpha, weight, beta) -> None:
     loss = sparsity_loss(denoised, image, all_valid(image), alpha, beta)
     sparsity = beta * loss.wavelet + (1 - beta) * loss.fourier
     expected = weight * sparsity + (1 - weight) * loss.residual
-    torch.testing.assert_close(loss.total, expected, rtol=1e-6, atol=0)
+    torch.testing.assert_close(loss.loss, expected, rtol=1e-6, atol=0)
 
 
 @pytest.mark.parametrize("width", [1, 2, 7, 8])
@@ -136,7 +136,7 @@ def test_values_and_gradients_are_finite(size, value, share, norm) -> None:
     denoised = image.clone().requires_grad_()
     seen = torch.where(valid, image, math.nan)
     loss = sparsity_loss(denoised, seen, valid, alpha=5, beta=0.5, norm=norm)
-    loss.total.backward()
+    loss.loss.backward()
     assert all(part.isfinite() for part in loss)
     assert denoised.grad.isfinite().all()
 
@@ -152,6 +152,6 @@ def test_autocast_takes_nothing_from_its_precision() -> None:
 def test_bfloat16_images_are_summed_in_float32() -> None:
     denoised = noise(1, 2, 16, 32).bfloat16().requires_grad_()
     loss = sparsity_loss(denoised, denoised.detach(), all_valid(denoised), alpha=5, beta=0.5)
-    loss.total.backward()
-    assert loss.total.dtype == torch.float32
+    loss.loss.backward()
+    assert loss.loss.dtype == torch.float32
     assert denoised.grad.isfinite().all()

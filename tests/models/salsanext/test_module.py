@@ -102,7 +102,7 @@ def test_the_published_loss_trains_empty_pixels_and_knows_no_false_alarm(pixels)
     surprise = -np.log(probability[np.arange(500), rain.astype(int)])
     expected = (weight * surprise).sum() / weight.sum()
     assert loss.cross_entropy.item() == pytest.approx(expected, rel=1e-5)
-    assert loss.total.item() == pytest.approx((loss.cross_entropy + loss.lovasz).item())
+    assert loss.loss.item() == pytest.approx((loss.cross_entropy + loss.lovasz).item())
 
 
 def test_the_corrected_loss_leaves_empty_pixels_out(pixels) -> None:
@@ -116,8 +116,8 @@ def test_the_corrected_loss_leaves_empty_pixels_out(pixels) -> None:
     assert [part.item() for part in again] == [part.item() for part in loss]
     as_published = losing(published_loss=True)
     assert not torch.equal(
-        as_published.segmentation_loss(changed, target).total,
-        as_published.segmentation_loss(logits, target).total,
+        as_published.segmentation_loss(changed, target).loss,
+        as_published.segmentation_loss(logits, target).loss,
     )
 
 
@@ -136,7 +136,7 @@ def test_false_alarms_cost_in_the_corrected_lovasz_loss_alone(pixels) -> None:
 @pytest.mark.parametrize("of", [IGNORED, 0, 1], ids=["empty", "no rain", "nothing but rain"])
 def test_both_losses_are_defined_for_one_kind_of_pixel(of, published_loss) -> None:
     logits = torch.randn(40, 2, generator=torch.Generator().manual_seed(0), requires_grad=True)
-    loss = losing(published_loss).segmentation_loss(logits, torch.full((40,), of)).total
+    loss = losing(published_loss).segmentation_loss(logits, torch.full((40,), of)).loss
     loss.backward()
     assert loss.isfinite()
     assert logits.grad.isfinite().all()
