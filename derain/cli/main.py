@@ -14,7 +14,7 @@ from derain import __version__
 from derain.cli.parser import Parser
 from derain.cli.signals import interrupting
 from derain.errors import InputError, ScanWarning
-from derain.system.extras import TRAINING_LIBRARIES, missing_extra, require
+from derain.system.extras import missing_extra
 
 DESCRIPTION = """\
 Takes the rain out of LiDAR and fused LiDAR + 4D-radar scans.
@@ -150,26 +150,15 @@ def module_of(command: str) -> ModuleType:
 
 def _run(arguments: list[str]) -> int:
     if arguments and arguments[0] in TRAINING:
-        return _run_training(arguments)
+        from derain.cli.training import train
+
+        return train(arguments)
     command = next((word for word in arguments if word in COMMANDS), None)
     chosen = _parser(command).parse_args(arguments)
     from derain.system.memory import keep_freed_memory  # not needed to print a version or help
 
     keep_freed_memory()
     return int(module_of(chosen.command).main(chosen))
-
-
-def _run_training(arguments: list[str]) -> int:
-    from derain.cli.training import short_help, train
-    from derain.workflows.configurations import require_configuration
-
-    if {"-h", "--help"} & {*arguments}:
-        print(short_help(arguments[0]))
-        return 0
-    require_configuration(arguments)
-    require(arguments[0], *TRAINING_LIBRARIES)
-    train(arguments)
-    return 0
 
 
 def _parser(command: str | None) -> Parser:

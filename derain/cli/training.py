@@ -2,7 +2,8 @@
 
 import shlex
 
-from derain.workflows.configurations import packaged_configs
+from derain.system.extras import TRAINING_LIBRARIES, require
+from derain.workflows.configurations import packaged_configs, require_configuration
 
 # What `--help` becomes where all options are to be listed.
 ALL = "--help-all"
@@ -53,12 +54,8 @@ OPTIONS = """\
   --seed_everything N               random seed (default: 0)"""
 
 
-def short_help(command: str) -> str:
-    """The help of a command of Lightning's that fits on a screen.
-
-    Args:
-        command: ``fit``, ``validate``, ``test`` or ``predict``.
-    """
+def _short_help(command: str) -> str:
+    """The help of one of the four commands that fits on a screen."""
     networks: dict[str, list[str]] = {}
     for name in packaged_configs():
         networks.setdefault(name.split("_")[0], []).append(name)
@@ -71,22 +68,33 @@ def short_help(command: str) -> str:
     )
 
 
-def train(arguments: list[str]) -> None:
+def train(arguments: list[str]) -> int:
     """Runs one of the four commands; after a training, prints how to export its best checkpoint.
 
     Args:
         arguments: The command and its options.
 
+    Returns:
+        The exit code, 0.
+
     Raises:
-        InputError: As for :func:`derain.workflows.training.run_trainer`.
+        InputError: No configuration, or a library of the extra ``train`` is not installed; or as
+            for :func:`derain.workflows.training.run_trainer`.
     """
+    if {"-h", "--help"} & {*arguments}:
+        print(_short_help(arguments[0]))
+        return 0
+    require_configuration(arguments)
+    require(arguments[0], *TRAINING_LIBRARIES)
     from derain.cli.outputs import print_lines
     from derain.workflows.progress import EpochLines
     from derain.workflows.training import run_trainer
 
     words = ["--help" if argument == ALL else argument for argument in arguments]
-    trainer = run_trainer(words, EXAMPLES, {"callbacks": [EpochLines()]}).trainer
+    callbacks = {"callbacks": [EpochLines()]}
+    trainer = run_trainer(words, EXAMPLES[arguments[0]], callbacks).trainer
     best = getattr(trainer.checkpoint_callback, "best_model_path", "")
     if arguments[0] == "fit" and best and trainer.is_global_zero:
         print_lines(f"Best checkpoint: {best}")
         print_lines(f"derain export {shlex.quote(best)} --out model.onnx")
+    return 0

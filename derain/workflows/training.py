@@ -13,12 +13,7 @@ import torch
 from jsonargparse import DefaultHelpFormatter, Namespace
 from lightning.pytorch import LightningModule, Trainer
 from lightning.pytorch.callbacks import LearningRateMonitor, ModelCheckpoint
-from lightning.pytorch.cli import (
-    ArgsType,
-    LightningArgumentParser,
-    LightningCLI,
-    SaveConfigCallback,
-)
+from lightning.pytorch.cli import LightningArgumentParser, LightningCLI, SaveConfigCallback
 from lightning.pytorch.loggers import TensorBoardLogger
 from torch.distributed import is_torchelastic_launched
 
@@ -105,7 +100,21 @@ def choices() -> dict[str, tuple[type, ...]]:
 
 
 class DerainCLI(LightningCLI):
-    """Lightning's command line with the callbacks that every run of derain has."""
+    """Lightning's command line for one method of the trainer, with the callbacks of every run.
+
+    Args:
+        method: ``fit``, ``validate``, ``test`` or ``predict``. The options of the others are left
+            out, because each method takes a quarter of a second to prepare.
+        options: The arguments of :class:`LightningCLI`.
+    """
+
+    def __init__(self, method: str, **options: Any) -> None:
+        self._method = method
+        super().__init__(DerainingModule, ScanDataModule, **options)
+
+    def subcommands(self) -> dict[str, set[str]]:
+        """The method, and those of its arguments that are no options."""
+        return {self._method: super().subcommands()[self._method]}
 
     def add_arguments_to_parser(self, parser: LightningArgumentParser) -> None:
         """Adds the callbacks; ``--checkpoint.monitor`` and so on change them."""
@@ -131,16 +140,16 @@ class DerainCLI(LightningCLI):
                 "last.enable_version_counter": False,
             }
         )
-        self.parser_of_a_subcommand = parser  # the subcommands have nearly the same options
 
-    def parse_arguments(self, parser: LightningArgumentParser, args: ArgsType) -> None:
+    def parse_arguments(self, parser: LightningArgumentParser, args: list[str]) -> None:
         """Refuses what cannot be used: options, and checkpoints before Lightning reads them."""
-        known = known_options(self.parser_of_a_subcommand, choices())
-        arguments = args if isinstance(args, list) else []
-        parser.set_defaults({"test.verbose": False})  # the table is in our report
+        if self._method == "test":
+            parser.set_defaults({"test.verbose": False})  # the table is in our report
+        classes = choices()  # loaded first: a configuration may name them without their modules
         try:
             super().parse_arguments(parser, args)
         except argparse.ArgumentError as error:
+            known = known_options(self._subcommand_parsers[self._method], classes)
             raise as_input_error(error.message, known) from error
         self._check_options()
         path = self.config[self.config.subcommand].get("ckpt_path")
@@ -151,7 +160,7 @@ class DerainCLI(LightningCLI):
         check = check_resumable if self.config.subcommand == "fit" else load_model
         check(Path(path))
         if self.config.subcommand == "test":
-            self._log_beside(Path(path), arguments)
+            self._log_beside(Path(path), args)
 
     def _parse_ckpt_path(self) -> None:
         """Takes the model's class and arguments from the checkpoint, as Lightning does.
@@ -250,7 +259,7 @@ class WholeConfig(SaveConfigCallback):
 
 def run_trainer(
     arguments: Sequence[str],
-    descriptions: Mapping[str, str] | None = None,
+    description: str | None = None,
     trainer: Mapping[str, Any] | None = None,
 ) -> DerainCLI:
     """Makes model, data and trainer from options, and runs one of the trainer's methods.
@@ -258,7 +267,7 @@ def run_trainer(
     Args:
         arguments: ``fit``, ``validate``, ``test`` or ``predict``, and its options; ``--config``
             takes a file or the name of a packaged configuration.
-        descriptions: Text above the list of all options, by method.
+        description: Text above the list of all options.
         trainer: Defaults of the trainer, and callbacks besides those that every run has.
 
     Returns:
@@ -268,17 +277,16 @@ def run_trainer(
         InputError: A configuration that does not exist, a folder that cannot be written, or what
             data and model raise.
     """
-    _prepare_process(arguments[0])
+    method = arguments[0]
+    _prepare_process(method)
     of_parsers = {
         "formatter_class": ExamplesFormatter,
         "allow_abbrev": False,  # a misspelling is no abbreviation
         "exit_on_error": False,  # faults become InputErrors
     }
-    texts = descriptions or {}
     with refusals_in_a_line():
         return DerainCLI(
-            DerainingModule,
-            ScanDataModule,
+            method,
             subclass_mode_model=True,
             subclass_mode_data=True,
             seed_everything_default=0,
@@ -287,10 +295,7 @@ def run_trainer(
             # Every run has a folder of its own; only one without a logger meets its last one.
             save_config_kwargs={"overwrite": True},
             trainer_defaults={"enable_model_summary": False, **(trainer or {})},
-            parser_kwargs={
-                **of_parsers,
-                **{name: {**of_parsers, "description": text} for name, text in texts.items()},
-            },
+            parser_kwargs={**of_parsers, method: {**of_parsers, "description": description}},
             args=with_packaged_configs(arguments),
         )
 

@@ -1,6 +1,6 @@
 """Tunes filters and thresholds of models on labelled scans."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -41,12 +41,9 @@ def bounds_of_rain(data: ScanData, frames: Sequence[Frame], inside: float) -> Ca
     Raises:
         InputError: A scan that cannot be read.
     """
-
-    def known() -> Iterator[tuple[Any, Any]]:
-        for frame in tqdm(frames, desc="bounding rain", unit="scan", disable=None):
-            yield data.card.known_points(data.read_measured(frame))
-
-    return fit_candidates(known(), ("intensity",), inside)
+    shown = tqdm(frames, desc="bounding rain", unit="scan", disable=None)
+    known = (data.card.known_points(data.read_measured(frame)) for frame in shown)
+    return fit_candidates(known, ("intensity",), inside)
 
 
 def tune_filter_on(

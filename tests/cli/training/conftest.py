@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+import lightning.pytorch  # noqa: F401  here, for its log keeps the stderr that it is imported with
 import pytest
 
 
