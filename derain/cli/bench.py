@@ -32,17 +32,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from derain.cli import unit_options
 from derain.cli.method_options import add_runtime, list_methods, runtime_of
 from derain.cli.options import add_data, add_threads, command_line, count, labelled
 from derain.cli.outputs import print_lines
 from derain.cli.parser import Parser
-from derain.cli.unit_options import (
-    UNIT_OPTIONS,
-    add_units,
-    division_of,
-    executor_of,
-    share_threads,
-)
 from derain.errors import InputError
 from derain.evaluation.published_tables import TABLES, paper_table, scans_by_group
 from derain.files.atomic import replacing, require_writable
@@ -92,7 +86,7 @@ def add_arguments(parser: Parser) -> None:
         "--repeats", type=count, default=3, help="timed runs of each scan (default: %(default)s)"
     )
     parser.add_argument("--seed", type=int, default=0, help="random seed (default: 0)")
-    add_units(parser, workers="1")
+    unit_options.add_units(parser, workers="1")
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -103,16 +97,11 @@ def main(arguments: argparse.Namespace) -> int:
     from derain.export.bench.labelled_frames import LabelledFrames
     from derain.export.bench.report import with_published_rows
 
-    read = partial(
-        labelled,
-        card=arguments.card,
-        columns=arguments.columns,
-        intensity_scale=arguments.intensity_scale,
-        topic=arguments.topic,
-        distinct=arguments.distinct,
-    )
-    data = read(arguments.data)
-    training = read(arguments.train) if arguments.train else data
+    topic, distinct = arguments.topic, arguments.distinct
+    data = labelled(arguments.data, arguments, topic, distinct)
+    training = data
+    if arguments.train:
+        training = labelled(arguments.train, arguments, topic, distinct)
     rates = rain_rates(arguments.data, arguments.rain_rates)
 
     def labelled_frames(scans: "LabelledScans", frames: Sequence[Frame]) -> LabelledFrames:
@@ -130,9 +119,9 @@ def main(arguments: argparse.Namespace) -> int:
     require_writable(arguments.out / "bench.json")
     effort = Effort(arguments.threads, arguments.timed, arguments.repeats, arguments.seed)
 
-    division, workers = division_of(arguments), arguments.workers or 1
-    command = command_line(arguments, without=UNIT_OPTIONS)
-    share_threads(arguments, workers)
+    division, workers = unit_options.division_of(arguments), arguments.workers or 1
+    command = command_line(arguments, without=unit_options.UNIT_OPTIONS)
+    unit_options.share_threads(arguments, workers)
 
     def bench(frames: Sequence[Frame], out: Path) -> "Bench | None":
         """Benches the methods on some of the scans, and writes tables and picture.
@@ -140,7 +129,7 @@ def main(arguments: argparse.Namespace) -> int:
         Returns None while other shards are to be scored.
         """
         chosen = labelled_frames(data, evenly_spaced(frames, arguments.limit or len(frames)))
-        with executor_of(arguments, workers) as executor:
+        with unit_options.executor_of(arguments, workers) as executor:
             counted = count_in_units(methods, chosen, arguments.threads, out, division, executor)
         if counted is None:
             print_lines(f"Progress of the other shards: derain status {out}")

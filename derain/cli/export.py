@@ -92,7 +92,7 @@ def main(arguments: argparse.Namespace) -> int:
     from derain.export.timing import measure_latency
     from derain.models.checkpoint import load_model
 
-    out, scan, scale = arguments.out, arguments.scan, arguments.intensity_scale
+    out, scan = arguments.out, arguments.scan
     if scan is not None and not (is_file(scan) or split(scan)):
         raise InputError(scan, "there is no such file", "Check --scan.")
     if arguments.inside is not None and not arguments.candidates:
@@ -104,7 +104,7 @@ def main(arguments: argparse.Namespace) -> int:
     runtime = runtime_of(arguments)
     model = load_model(arguments.checkpoint)
     frames = named_frames(arguments.calibration, arguments.columns).map(
-        lambda frame: frame.with_intensity_times(scale)
+        lambda frame: frame.with_intensity_times(arguments.intensity_scale)
     )
     calibration = evenly_spaced(frames, CALIBRATION_SCANS)
     # The proof does not show scans of another unit: both models judge the same ones.
@@ -113,7 +113,7 @@ def main(arguments: argparse.Namespace) -> int:
         notices.warn(frame.name, model.spec.issues(frame.read()))
     notices.warn_of_repeats()
     if arguments.candidates:
-        data = options.labelled(arguments.candidates, arguments.card, arguments.columns, scale)
+        data = options.labelled(arguments.candidates, arguments)
         inside = RAIN_INSIDE if arguments.inside is None else arguments.inside
         _fit_candidates(model, data, inside)
     print(export(model, out, calibration, runtime))

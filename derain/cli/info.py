@@ -40,14 +40,13 @@ from derain.cli.info_file import facts_of_file
 from derain.cli.info_folder import draw, facts_of_folder
 from derain.cli.options import add_columns, add_topic
 from derain.cli.outputs import print_lines
-from derain.cli.unit_options import add_executor, add_shard, executor_of, shard_of
+from derain.cli.unit_options import add_executor, add_shard, executor_of
 from derain.default import DEFAULT, ModelCard, ModelScore, default_model, model_card
 from derain.errors import InputError, printable
 from derain.evaluation.text_tables import number_text, plain_table
 from derain.files.documents import Entry
 from derain.files.format import FORMATS
 from derain.sources.folders import named_frames
-from derain.sources.units import Division
 from derain.stores.url import place_of
 from derain.system.extras import MATPLOTLIB, require
 from derain.system.notices import warn
@@ -168,19 +167,8 @@ def _describe_default(as_json: bool) -> None:
 
 
 def _describe_folder(folder: Path, arguments: argparse.Namespace) -> None:
-    division = Division()
-    if arguments.out is not None:
-        division = Division(shard=shard_of(arguments), anew=arguments.anew)
     with executor_of(arguments, arguments.workers or 1) as executor:
-        facts = facts_of_folder(
-            folder,
-            arguments.card,
-            arguments.layout,
-            arguments.columns,
-            arguments.out,
-            division,
-            executor,
-        )
+        facts = facts_of_folder(folder, arguments, executor)
     if facts is None:
         print_lines(f"Progress of the other shards: derain status {arguments.out}")
         return

@@ -1,5 +1,6 @@
 """Facts that ``derain info`` prints about a folder: scans and points by class and rain rate."""
 
+import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import Any, Literal
 from derain.cards.card import DataCard, load_card
 from derain.cards.known import card_by_folders, layouts_for
 from derain.cards.layout import Layout
+from derain.cli.unit_options import shard_of
 from derain.errors import InputError
 from derain.evaluation.contents import (
     Contents,
@@ -22,7 +24,6 @@ from derain.simulation.manifest import manifest_of
 from derain.sources.frame import Frame
 from derain.sources.search import find_layout
 from derain.sources.units import Division, FrameUnit, folder_of_paths, shared_options, units_of
-from derain.stores.url import Place
 
 # What a data card is chosen by. Names of folders that many data sets have make it a guess.
 CardRestsOn = Literal["--card", "manifest", "names of folders"]
@@ -35,8 +36,8 @@ class FolderFacts:
 
     Attributes:
         folder: The folder.
-        layout: Names of its folders; None where scans lie directly in it, or in folders of
-            recordings.
+        folders: Names of its folders of scans and labels; None where scans lie directly in it, or
+            in folders of recordings.
         card: The data card that names the classes; None where none does.
         card_rests_on: Evidence for the card.
         by_rain_rate: Counts by rain rate in mm/h in ascending order; None last, for
@@ -44,7 +45,7 @@ class FolderFacts:
     """
 
     folder: Path
-    layout: Layout | None
+    folders: Sequence[str] | None
     card: DataCard | None
     card_rests_on: CardRestsOn
     by_rain_rate: Mapping[float | None, Contents]
@@ -53,11 +54,6 @@ class FolderFacts:
     def classes(self) -> Mapping[int, str]:
         """Names of the classes, by id; none without a data card."""
         return {} if self.card is None else self.card.classes
-
-    @property
-    def folders(self) -> list[str] | None:
-        """Names of its folders of scans and labels; None where it is no data set."""
-        return None if self.layout is None else [self.layout.scans, self.layout.labels]
 
     @property
     def total(self) -> Contents:
@@ -93,12 +89,8 @@ class FolderFacts:
             counts = [f"{contents.labelled[id_]:,}" for contents in columns]
             share = f"{total.labelled[id_] / total.labelled.total():.3%}"
             rows.append([class_name(id_, self.classes), counts[0], share, *counts[1:]])
-        return f"{self.folder} ({self._explained})\n{plain_table(rows)}"
-
-    @property
-    def _explained(self) -> str:
         layout = "a folder of scans" if self.folders is None else " and ".join(self.folders)
-        return f"{layout}; classes: {self._card_explained}"
+        return f"{self.folder} ({layout}; classes: {self._card_explained})\n{plain_table(rows)}"
 
     @property
     def _card_explained(self) -> str:
@@ -115,24 +107,13 @@ class FolderFacts:
 
 
 def facts_of_folder(
-    folder: Path,
-    card_name: str | None,
-    layout_names: str | None,
-    columns: Sequence[str],
-    records: Place | None = None,
-    division: Division = Division(),
-    executor: Submits | None = None,
+    folder: Path, arguments: argparse.Namespace, executor: Submits | None
 ) -> FolderFacts | None:
     """Counts what is in a folder.
 
     Args:
         folder: The folder.
-        card_name: Its data card; None chooses one by what is in the folder.
-        layout_names: Names of its folders of scans and labels, with a comma between; None finds
-            them.
-        columns: Names of the columns of files that do not name them.
-        records: Folder for records of the counts; None keeps none.
-        division: Division of the scans into units.
+        arguments: The options of the command.
         executor: Counts the units; None counts them in this process.
 
     Returns:
@@ -142,11 +123,15 @@ def facts_of_folder(
         InputError: A folder without scans, a file in it that cannot be read, or no such data card;
             records of another folder.
     """
-    card = None if card_name is None else load_card(card_name)
+    records, division = arguments.out, Division()
+    if records is not None:
+        division = Division(shard=shard_of(arguments), anew=arguments.anew)
+    card = None if arguments.card is None else load_card(arguments.card)
     layouts = layouts_for(card)
-    layout = _layout(folder, card, layout_names)
+    layout = _layout(folder, card, arguments.layout)
+    folders = None if layout is None else [layout.scans, layout.labels]
     card, rests_on = (card, "--card") if card else _card(folder, layout)
-    sequences = find_sequences(folder, layout, columns, layouts)
+    sequences = find_sequences(folder, layout, arguments.columns, layouts)
     rates = sorted(
         {sequence.rain_rate for sequence in sequences}, key=lambda rate: (rate is None, rate or 0)
     )
@@ -167,7 +152,7 @@ def facts_of_folder(
         options = {
             **shared_options("info", frames, block),
             "folder": str(folder),
-            "layout": None if layout is None else [layout.scans, layout.labels],
+            "layout": folders,
         }
         job, shard = division.begin(records, options, units)
     places = () if records is None else (records,)
@@ -177,7 +162,7 @@ def facts_of_folder(
         return None
     for rate, counts in zip(rate_of_unit, counted, strict=True):
         by_rain_rate[rate].add(Contents.from_json(counts))
-    return FolderFacts(folder, layout, card, rests_on, by_rain_rate)
+    return FolderFacts(folder, folders, card, rests_on, by_rain_rate)
 
 
 def draw(facts: FolderFacts, picture: Path) -> None:

@@ -17,6 +17,7 @@ the exit code is 2.
 import argparse
 import math
 import sys
+from functools import partial
 from pathlib import Path
 
 from derain.cli.options import add_columns, add_json, add_threads, add_topic
@@ -60,10 +61,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     source = named_frames(arguments.sequences, arguments.columns, topic=arguments.topic)
-
-    def show(frame: Frame, registration: Registration, stopwatch: Stopwatch) -> None:
-        _print_registration(frame, registration, stopwatch, arguments.json)
-
     recordings = find_poses(
         source,
         arguments.out,
@@ -71,7 +68,7 @@ def main(arguments: argparse.Namespace) -> int:
         replace=arguments.replace,
         threads=arguments.threads,
         guard=Failures(print_error).skipping_failures,
-        watch=show,
+        watch=partial(_print_registration, arguments.json),
     )
     for found in recordings:
         if found.fault is None:
@@ -83,7 +80,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _print_registration(
-    frame: Frame, found: Registration, stopwatch: Stopwatch, as_json: bool
+    as_json: bool, frame: Frame, found: Registration, stopwatch: Stopwatch
 ) -> None:
     unknown = math.isnan(found.residual)
     facts = {

@@ -18,9 +18,6 @@ from derain.recordings.posed import ODOMETRY, STANDING
 if TYPE_CHECKING:
     from derain.datamodules.labelled import LabelledScans
 
-# Flags that can be given as --no-..., by the name that argparse gives their values.
-DENIABLE = ("distinct",)
-
 
 def count(text: str, least: int = 1) -> int:
     """A whole number of 1 or more."""
@@ -172,9 +169,7 @@ def add_data(parser: argparse.ArgumentParser, part: str) -> None:
 
 def labelled(
     paths: Sequence[Path],
-    card: str | None,
-    columns: tuple[str, ...],
-    intensity_scale: float,
+    arguments: argparse.Namespace,
     topic: str | None = None,
     distinct: bool | None = None,
 ) -> "LabelledScans":
@@ -182,9 +177,8 @@ def labelled(
 
     Args:
         paths: Scans and folders of them, or the root of one data set.
-        card: Name or file of their data card; None finds it by their folders.
-        columns: Names of the columns of files that do not name them.
-        intensity_scale: Factor from the scans' intensities to the unit of the data card.
+        arguments: The options, of which the data card, the columns and the scale of intensities
+            tell how the scans are read.
         topic: Topic of point clouds in bags; None where the paths name it.
         distinct: True if points at one position count once; None follows the data card.
 
@@ -194,8 +188,9 @@ def labelled(
     from derain.datamodules.labelled import card_of, labelled_scans
     from derain.datamodules.scan_data import Loading
 
-    loading = Loading(columns=columns, intensity_scale=intensity_scale, deduplicate=distinct)
-    return labelled_scans(paths, card_of(paths, card), loading, topic)
+    columns, scale = arguments.columns, arguments.intensity_scale
+    loading = Loading(columns=columns, intensity_scale=scale, deduplicate=distinct)
+    return labelled_scans(paths, card_of(paths, arguments.card), loading, topic)
 
 
 def command_line(
@@ -206,15 +201,11 @@ def command_line(
     Args:
         arguments: The parsed arguments, with the name of the command.
         positional: Name of the positional argument, if there is one.
-        without: Names of arguments that change no result.
+        without: Names of arguments that change no result, and of all flags without a ``--no-``.
     """
     words = ["derain", arguments.command]
     for name, value in vars(arguments).items():
-        if (
-            name in ("command", *without)
-            or value is None
-            or (value is False and name not in DENIABLE)
-        ):
+        if name in ("command", *without) or value is None:
             continue
         if name != positional:
             words.append(f"--{'no-' if value is False else ''}{name.replace('_', '-')}")

@@ -52,25 +52,10 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
+from derain.cli import options, unit_options
 from derain.cli.method_options import add_method_and_scans, method_and_scans, method_of
-from derain.cli.options import (
-    add_columns,
-    add_intensity_scale,
-    add_json,
-    add_poses,
-    add_topic,
-    share,
-)
 from derain.cli.outputs import exit_code, noting_progress, print_error, print_facts, print_lines
 from derain.cli.parser import Parser
-from derain.cli.unit_options import (
-    add_units,
-    division_of,
-    executor_of,
-    method_and_workers,
-    odometry_of,
-    with_given_poses,
-)
 from derain.cli.weather_options import (
     add_weather,
     warn_of_bad_weather,
@@ -80,7 +65,7 @@ from derain.cli.weather_options import (
 from derain.default import DEFAULT, model_card
 from derain.errors import InputError
 from derain.example import Truth
-from derain.export.methods import CUES, DELAY, PAST
+from derain.export.methods import DELAY, PAST, over_recording
 from derain.export.runtime import Derainer
 from derain.files.labels import LABEL
 from derain.sources.clean_sink import CleanSink, require_probabilities
@@ -111,12 +96,12 @@ def add_arguments(parser: Parser) -> None:
         parser, help="scans, folders of scans or of recordings, data sets, bags, or URLs"
     )
     parser.add_argument("--out", type=place_of, required=True, help="folder or URL to write to")
-    add_json(parser)
-    add_columns(parser)
-    add_intensity_scale(parser)
+    options.add_json(parser)
+    options.add_columns(parser)
+    options.add_intensity_scale(parser)
     parser.add_argument(
         "--most-removed",
-        type=share,
+        type=options.share,
         default=MOST_RAIN,
         metavar="SHARE",
         help="skip scans with more than SHARE rain among their valid points (default: %(default)g; "
@@ -135,8 +120,8 @@ def add_arguments(parser: Parser) -> None:
         "--delay", type=int, metavar="N", help=f"use N scans after each scan (default: {DELAY})"
     )
     parser.add_argument("--alone", action="store_true", help="judge each scan by itself")
-    add_poses(parser)
-    add_topic(parser)
+    options.add_poses(parser)
+    options.add_topic(parser)
     parser.add_argument(
         "--cleaned-topic",
         metavar="NAME",
@@ -151,25 +136,23 @@ def add_arguments(parser: Parser) -> None:
         help="bags: keep rows and columns of organised clouds; removed points become NaN",
     )
     add_weather(parser)
-    add_units(parser)
+    unit_options.add_units(parser)
     parser.use_rarely(*RARE)
 
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     name, scans = method_and_scans(arguments.method, arguments.scans or [])
-    division = division_of(arguments)
+    division = unit_options.division_of(arguments)
     single_scan_method = method_of(name, arguments)
     results = [folder for folder in (arguments.out, arguments.removed) if folder is not None]
     frames = frames_at(scans, arguments.columns, arguments.topic, results)
-    source = with_given_poses(frames, arguments).map(
-        lambda frame: frame.with_intensity_times(arguments.intensity_scale)
-    )
+    source = unit_options.prepared(frames, arguments)
     if arguments.probability:
         require_probabilities(single_scan_method, source)
     # The number of clouds of a bag in a store is known only after fetching it.
     several = len(source) > 1 or isinstance(source[0], StoredBag)
-    method, workers = method_and_workers(
+    method, workers = unit_options.method_and_workers(
         _with_scans_around(single_scan_method, arguments, several),
         lambda: _with_scans_around(method_of(name, arguments), arguments, several),
         source,
@@ -187,7 +170,7 @@ def main(arguments: argparse.Namespace) -> int:
         sink,
         weather_table(arguments.weather) as rows,
         noting_progress(sink.so_far),
-        executor_of(arguments, workers) as executor,
+        unit_options.executor_of(arguments, workers) as executor,
     ):
         printer = _Printer(arguments.out, rows, arguments.json)
         if name == DEFAULT:
@@ -200,7 +183,7 @@ def main(arguments: argparse.Namespace) -> int:
             source,
             method,
             sink,
-            placing=odometry_of(arguments),
+            placing=unit_options.odometry_of(arguments),
             most_removed=arguments.most_removed,
             weather=weather,
             observer=printer,
@@ -228,21 +211,20 @@ def _with_scans_around(method: Method, arguments: argparse.Namespace, several: b
         InputError: ``--past`` or ``--delay`` with a method that is no model, or with ``--alone``;
             ``--alone`` with a method that needs several scans.
     """
-    is_set = arguments.past is not None or arguments.delay is not None
+    past, delay = arguments.past, arguments.delay
+    is_set = past is not None or delay is not None
     if arguments.alone and (is_set or not method.window.is_one_scan):
         reason = "excludes --past and --delay, and methods that need several scans"
         raise InputError("--alone", reason, "Leave it out.")
-    if is_set and not isinstance(method, Derainer):
+    if not is_set:
+        return over_recording(method) if several and not arguments.alone else method
+    if not isinstance(method, Derainer):
         raise InputError("--past, --delay", "are options of models", "Leave them out.")
-    by_default = isinstance(method, Derainer) and method.spec.network == CUES and several
-    if isinstance(method, Derainer) and (is_set or (by_default and not arguments.alone)):
-        from derain.export.recorded import RecordedDerainer  # a single scan needs no odometry
+    from derain.export.recorded import RecordedDerainer  # a single scan needs no odometry
 
-        past, delay = arguments.past, arguments.delay
-        return RecordedDerainer(
-            method, PAST if past is None else past, DELAY if delay is None else delay
-        )
-    return method
+    return RecordedDerainer(
+        method, PAST if past is None else past, DELAY if delay is None else delay
+    )
 
 
 class _Printer(CleaningObserver):

@@ -17,7 +17,6 @@ import json
 from derain.cli.outputs import print_lines
 from derain.cli.parser import Parser
 from derain.jobs.job import Job, JobStatus, job_status
-from derain.jobs.unit import Record
 from derain.sources.cleaned_scan import CleanedTotals
 from derain.stores.url import place_of
 
@@ -35,16 +34,12 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     is_run = Job.at(arguments.out).options.get("command") == "run"
     cleaned = CleanedTotals() if is_run else None
-    status = job_status(arguments.out, _pass_over if cleaned is None else cleaned.add)
+    status = job_status(arguments.out, (lambda _: None) if cleaned is None else cleaned.add)
     if arguments.json:
         print(json.dumps(_as_dict(status, cleaned)))
     else:
         print_lines("\n".join(_lines(status, cleaned)))
     return 0 if status.done == len(status.units) else 2
-
-
-def _pass_over(record: Record) -> None:
-    """Adds up nothing."""
 
 
 def _lines(status: JobStatus, cleaned: CleanedTotals | None) -> list[str]:

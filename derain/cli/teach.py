@@ -31,25 +31,16 @@ from typing import TYPE_CHECKING
 
 from derain.cards.card import load_card, packaged_cards
 from derain.cards.known import layouts_for
+from derain.cli import options, unit_options
 from derain.cli.method_options import add_method_and_scans, method_and_scans, method_of
-from derain.cli.options import add_columns, add_intensity_scale, add_json, add_poses, add_topic
 from derain.cli.outputs import exit_code, print_error, print_facts, print_lines
 from derain.cli.parser import Parser
-from derain.cli.unit_options import (
-    add_units,
-    division_of,
-    executor_of,
-    method_and_workers,
-    odometry_of,
-    with_given_poses,
-)
 from derain.evaluation.counts import or_none
 from derain.evaluation.text_tables import number_text
 from derain.export.methods import over_recording
 from derain.sources.folders import named_frames
 from derain.sources.judging import Failures
 from derain.stores.url import paths_of
-from derain.system.memory import keep_freed_memory
 
 if TYPE_CHECKING:
     from derain.annotation.teach import LabelledScan
@@ -64,12 +55,12 @@ def add_arguments(parser: Parser) -> None:
         help="data card of the scans' own labels, to compare with for the record: "
         f"{', '.join(packaged_cards())}, or a YAML file",
     )
-    add_json(parser)
-    add_columns(parser)
-    add_topic(parser)
-    add_intensity_scale(parser)
-    add_poses(parser)
-    add_units(parser)
+    options.add_json(parser)
+    options.add_columns(parser)
+    options.add_topic(parser)
+    options.add_intensity_scale(parser)
+    options.add_poses(parser)
+    unit_options.add_units(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -77,8 +68,7 @@ def main(arguments: argparse.Namespace) -> int:
     from derain.annotation.teach import refuse_to_overwrite
     from derain.workflows.teaching import teach_recordings
 
-    keep_freed_memory()
-    division = division_of(arguments)
+    division = unit_options.division_of(arguments)
     name, scans = method_and_scans(arguments.method, arguments.scans or [], "teach", "taught")
     method = over_recording(method_of(name, arguments))
     card = None if arguments.card is None else load_card(arguments.card)
@@ -91,14 +81,12 @@ def main(arguments: argparse.Namespace) -> int:
         topic=arguments.topic,
     )
     refuse_to_overwrite(arguments.out, found)
-    source = with_given_poses(found, arguments).map(
-        lambda frame: frame.with_intensity_times(arguments.intensity_scale)
-    )
-    method, workers = method_and_workers(
+    source = unit_options.prepared(found, arguments)
+    method, workers = unit_options.method_and_workers(
         method, lambda: over_recording(method_of(name, arguments)), source, arguments
     )
     failures = Failures(print_error)
-    with executor_of(arguments, workers) as executor:
+    with unit_options.executor_of(arguments, workers) as executor:
         results = teach_recordings(
             method,
             source,
@@ -108,7 +96,7 @@ def main(arguments: argparse.Namespace) -> int:
             watch=lambda scan: _print_labels(scan, arguments.json),
             division=division,
             executor=executor,
-            placing=odometry_of(arguments),
+            placing=unit_options.odometry_of(arguments),
         )
     stream = sys.stderr if arguments.json else sys.stdout
     print_lines(f"{results.judged:,} scans\n{results.answers}", stream)
@@ -128,7 +116,7 @@ def main(arguments: argparse.Namespace) -> int:
 def _print_labels(scan: "LabelledScan", as_json: bool) -> None:
     not_rain, rain, not_known = map(or_none, scan.answers.shares.tolist())
     facts = {
-        "scan": scan.name,
+        "scan": scan.frame.name,
         "points": scan.answers.points,
         "rain": rain,
         "not_rain": not_rain,
@@ -136,8 +124,8 @@ def _print_labels(scan: "LabelledScan", as_json: bool) -> None:
         "milliseconds": dict(scan.milliseconds),
     }
     text = (
-        f"{scan.name}: {scan.answers.points:,} valid points, {number_text(rain, '.1%')} rain, "
-        f"{number_text(not_rain, '.1%')} not rain, {number_text(not_known, '.1%')} not known, "
-        f"{sum(scan.milliseconds.values()):.0f} ms"
+        f"{scan.frame.name}: {scan.answers.points:,} valid points, "
+        f"{number_text(rain, '.1%')} rain, {number_text(not_rain, '.1%')} not rain, "
+        f"{number_text(not_known, '.1%')} not known, {sum(scan.milliseconds.values()):.0f} ms"
     )
     print_facts(facts, text, as_json)

@@ -82,13 +82,7 @@ def main(arguments: argparse.Namespace) -> int:
         write_parameters,
     )
 
-    data = options.labelled(
-        arguments.data,
-        arguments.card,
-        arguments.columns,
-        arguments.intensity_scale,
-        arguments.topic,
-    )
+    data = options.labelled(arguments.data, arguments, arguments.topic)
     frames = data.frames(arguments.part)
     generator = np.random.default_rng(arguments.seed)
     most = min(arguments.scans, len(frames))

@@ -154,15 +154,19 @@ def share_threads(arguments: argparse.Namespace, workers: int) -> bool:
     return True
 
 
-def with_given_poses(source: Source, arguments: argparse.Namespace) -> Source:
-    """The scans with the poses that the arguments name, but for those of odometry.
+def prepared(source: Source, arguments: argparse.Namespace) -> Source:
+    """The scans with their intensities scaled, and with poses but for those of odometry.
+
+    Args:
+        source: The scans.
+        arguments: The options that name the scale and the poses.
 
     Raises:
         InputError: Poses that cannot be read or do not fit the scans.
     """
-    if arguments.poses in (None, ODOMETRY):
-        return source
-    return with_poses(source, arguments.poses)
+    if arguments.poses not in (None, ODOMETRY):
+        source = with_poses(source, arguments.poses)
+    return source.map(lambda frame: frame.with_intensity_times(arguments.intensity_scale))
 
 
 def odometry_of(arguments: argparse.Namespace) -> Odometry | None:

@@ -52,7 +52,6 @@ from derain.sources.folders import frame_of, named_frames
 from derain.sources.frame import Frame
 from derain.sources.recordings import irregularities
 from derain.system.extras import MATPLOTLIB, OPEN3D, require
-from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
 from derain.workflows.odometry import placed
 
@@ -134,7 +133,6 @@ def main(arguments: argparse.Namespace) -> int:
 def _view_recording(arguments: argparse.Namespace) -> int:
     """Writes a recording as several methods clean it, for Rerun's viewer."""
     refuse_unusable(arguments.rerun)
-    keep_freed_memory()
     methods = {
         title: load_method(*named_method(name), arguments.threads)
         for title, name in _names_by_title(arguments.methods).items()

@@ -111,7 +111,7 @@ def test_a_bench_that_goes_on_scores_no_unit_again_and_refuses_other_methods(
     write_labels(label, np.zeros(300, np.int64))  # from which position learns
     assert "method position" in refused(*arguments, "dror", "position")
     with monkeypatch.context() as nothing:
-        nothing.delattr(bench, "scorings")
+        nothing.delattr(bench, "score")
         succeed(*arguments, "dror", "position", "--train", root / "sequences/001/lidar_radar_pcd")
 
 
@@ -227,7 +227,7 @@ def test_the_papers_tables_need_a_data_set_with_a_split(refused, root, tmp_path)
 def test_a_folder_that_cannot_be_written_is_refused_before_any_work(
     refused, root, monkeypatch
 ) -> None:
-    monkeypatch.delattr(bench, "scorings")
+    monkeypatch.delattr(bench, "score")
     out = root / "manifest.json"
     line = refused("bench", "--data", root, "--methods", "all", "--out", out)
     assert "bench.json: cannot be written" in line

@@ -137,7 +137,7 @@ def test_a_recording_of_which_too_few_scans_can_be_labelled_is_refused_with_the_
 ) -> None:
     def teach(*_: object, **options: object) -> TeachResults:
         warn("2.bin: not to be trusted: it is of another place")
-        return TeachResults(Manifest({"method": "dror"}), 5, Answers.none(), None)
+        return TeachResults(Manifest({"method": "dror"}), 5, Answers(), None)
 
     monkeypatch.setattr(learn, "teach_recordings", teach)
     outcome = run_derain("learn", recording, "--out", "model.onnx", "--teacher", "dror")
