@@ -6,8 +6,8 @@
 It is trained by `cues_worlds.yaml`, on worlds alone. Leaves ``model.onnx`` and ``model.ckpt`` in
 ``OUT/seed_<seed>``, and the table that the threshold was chosen by. That is the one of highest IoU
 over the worlds that were held out, dry ones among them, raised until no clean scan that is given
-loses more than MOST_TAKEN, as long as that costs no more than MOST_LOST of the IoU. What is added to
-the log-odds of scans without intensities makes the model agree best with itself, as it judges
+loses more than MOST_TAKEN, as long as that costs no more than MOST_LOST of the IoU. What is added
+to the log-odds of scans without intensities makes the model agree best with itself, as it judges
 unlabelled recordings with their intensities; it is no more than clean scans allow, judged without
 theirs. No label of a real scan is read.
 """
