@@ -6,18 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 import yaml
 
 import derain
 from derain import default
 from derain.default import DEFAULT, default_checkpoint, default_model, model_card
 from derain.errors import InputError
-from derain.evaluation.hard_cases import scene
+from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export.methods import load_method
+from derain.export.proof import prove
 from derain.models.checkpoint import load_model
 from derain.scan import Scan
-from derain.views.probability import probability_of_rain
 
 # What the file may weigh, bytes: it is in every installation.
 LARGEST = 2_000_000
@@ -92,11 +91,8 @@ def test_the_checkpoint_is_of_the_same_model() -> None:
     model, derainer = load_model(default_checkpoint()).eval(), derain.Derainer(threads=1)
     drops = np.random.default_rng(0).uniform(-8, 8, (200, 4))
     scan = Scan.of(np.concatenate([scene(2000), drops]))
-    seen = model.spec.make_view(threads=1)(scan)
-    with torch.inference_mode():
-        logits = model(**{name: torch.from_numpy(each) for name, each in seen.inputs().items()})
-    probability = seen.back(probability_of_rain(logits.numpy()))
-    np.testing.assert_allclose(derainer.probability(scan), probability, atol=1e-4)
+    proof = prove(model, default_model(), [("drops", scan), *hard_cases(largest=3000)])
+    assert proof.holds, proof
     assert 0 < derainer(scan).sum() < len(scan)
     assert model.spec.as_dict() == derainer.spec.as_dict()
 

@@ -8,12 +8,12 @@ import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
 from derain.errors import InputError
-from derain.evaluation.hard_cases import hard_cases, scene
-from derain.export import onnx_file
+from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
 from derain.learning.batch import Batch, Sample
 from derain.models.cues import CueFusion
@@ -23,6 +23,7 @@ from derain.models.outdet import OutDet
 from derain.scan import Scan
 from derain.views.intensity_rank import INTENSITY_RANKS
 from derain.views.isolated_points import SHELLS
+from derain.views.probability import probability_of_rain
 
 from .conftest import trained_on_scenes
 
@@ -44,26 +45,28 @@ def trained(make_trainer) -> CueFusion:
 
 
 @pytest.fixture(scope="module")
-def exported(trained, tmp_path_factory) -> Derainer:
-    path = tmp_path_factory.mktemp("cues") / "model.onnx"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(onnx_file, "hard_cases", lambda: hard_cases(largest=3000))
-        assert onnx_file.export(trained, path).holds
-    return Derainer(path, threads=1)
+def packaged() -> Derainer:
+    """The model that comes with derain, which is one of cues."""
+    return Derainer(threads=1)
 
 
-def test_brightness_helps_whatever_its_unit(exported) -> None:
+def test_brightness_helps_whatever_its_unit(trained) -> None:
     scan = labelled(20)
     rain = scan.label == 110
-    called = exported(scan)
 
-    def iou(answer: np.ndarray) -> float:
+    def called(scan: Scan) -> NDArray[np.bool_]:
+        seen = trained.spec.make_view()(scan)
+        logits = trained.logits_of(Batch.of([Sample.of(scan, seen, trained.card)])).detach()
+        return seen.back(probability_of_rain(logits.numpy())) > 0.5
+
+    def iou(answer: NDArray[np.bool_]) -> float:
         return float((answer & rain).sum() / (answer | rain).sum())
 
-    assert iou(called) > 0.8
-    np.testing.assert_array_equal(exported(labelled(20, gain=1 / 255)), called)
-    alike = exported(replace(scan, intensity=np.full(len(scan), 7, np.float32)))
-    assert iou(alike) < iou(called) - 0.05
+    usual = called(scan)
+    assert iou(usual) > 0.8
+    np.testing.assert_array_equal(called(labelled(20, gain=1 / 255)), usual)
+    alike = called(replace(scan, intensity=np.full(len(scan), 7, np.float32)))
+    assert iou(alike) < iou(usual) - 0.05
 
 
 @pytest.mark.parametrize("doubt", [-20, 20])
@@ -90,7 +93,7 @@ def test_without_intensities_rain_is_the_likelier_the_more_of_it_there_is(traine
 
 @pytest.mark.parametrize(("drops", "are_rain"), [(0, False), (60, True)])
 def test_dim_specks_right_before_the_sensor_alone_are_its_carrier(
-    exported, drops, are_rain
+    packaged, drops, are_rain
 ) -> None:
     scan = labelled(22, drops=0)
     far = scan.take(np.linalg.norm(scan.xyz, axis=1) > 6.5)
@@ -99,28 +102,28 @@ def test_dim_specks_right_before_the_sensor_alone_are_its_carrier(
     ranges = np.concatenate([np.linspace(2.5, 5.5, drops), [1.0, 1.2, 1.4]])
     dim = np.column_stack([direction * ranges[:, None], np.full(drops + 3, 2.0)])
     points = np.concatenate([np.column_stack([far.xyz, far.intensity]), dim])
-    specks = exported.probability(Scan.of(points.astype(np.float32)))[-3:]
+    specks = packaged.probability(Scan.of(points.astype(np.float32)))[-3:]
     assert ((specks > 0.5) == are_rain).all()
 
 
-def test_points_without_intensity_are_judged_as_in_a_scan_that_has_none(exported) -> None:
+def test_points_without_intensity_are_judged_as_in_a_scan_that_has_none(packaged) -> None:
     scan = labelled(25)
     dark = np.arange(len(scan)) % 3 == 0
     intensity = np.where(dark, np.float32(np.nan), scan.intensity)
-    judgement = exported.judge_silently(replace(scan, intensity=intensity))
-    of_blank = exported.probability(replace(scan, intensity=None))
+    judgement = packaged.judge_silently(replace(scan, intensity=intensity))
+    of_blank = packaged.probability(replace(scan, intensity=None))
     np.testing.assert_array_equal(judgement.probability[dark], of_blank[dark])
-    of_others = exported.probability(scan.take(~dark))
+    of_others = packaged.probability(scan.take(~dark))
     np.testing.assert_array_equal(judgement.probability[~dark], of_others)
     assert judgement.judged.all()
     assert judgement.share_of_rain == judgement.rain.mean()
 
 
-def test_rows_in_another_order_are_judged_alike(exported) -> None:
+def test_rows_in_another_order_are_judged_alike(packaged) -> None:
     scan = labelled(21)
     order = np.random.default_rng(0).permutation(len(scan))
-    shuffled = exported.probability(scan.take(order))
-    np.testing.assert_allclose(shuffled, exported.probability(scan)[order], atol=1e-4)
+    shuffled = packaged.probability(scan.take(order))
+    np.testing.assert_allclose(shuffled, packaged.probability(scan)[order], atol=1e-4)
 
 
 def test_scans_of_a_batch_do_not_influence_each_other(trained) -> None:
