@@ -20,7 +20,7 @@ from derain.files.atomic import require_writable
 from derain.files.reading import is_file
 from derain.recordings.odometry import FrameOdometry, Registration
 from derain.recordings.posed import ODOMETRY, with_odometry, with_poses
-from derain.sources.frame import Frame
+from derain.sources.frame import Frame, times_of
 from derain.sources.judging import Guard, unguarded
 from derain.sources.recordings import recordings_of
 from derain.sources.records import POSES
@@ -239,10 +239,10 @@ def _times(recording: Sequence[Frame], form: PoseFormat) -> list[float]:
     Raises:
         InputError: Times that are missing or do not ascend, for ``tum``.
     """
-    times = [time for frame in recording if (time := frame.time) is not None]
+    times = times_of(recording)
     if form != "tum":
-        return times if len(times) == len(recording) else []
-    if len(times) < len(recording):
+        return times or []
+    if times is None:
         lacking = next(frame for frame in recording if frame.time is None)
         raise InputError(
             lacking.name,
