@@ -18,7 +18,7 @@ import yaml
 
 from derain.default import ModelCard, ModelScore, default_checkpoint, default_model, model_card
 from derain.evaluation.text_tables import markdown_table, number_text
-from derain.files.atomic import replacing
+from derain.files.atomic import write_text
 
 PYPROJECT = Path(__file__).resolve().parent.parent / "pyproject.toml"
 
@@ -128,8 +128,7 @@ def write(out: Path) -> None:
     """
     project = tomllib.loads(PYPROJECT.read_text("utf-8"))["project"]
     text = page(model_card(), project["urls"]["Repository"])
-    with replacing(out / "README.md") as temporary:
-        temporary.write_text(text, "utf-8")
+    write_text(out / "README.md", text)
     model = default_model()
     for file in (model, default_checkpoint(), model.with_name("card.yaml")):
         shutil.copy2(file, out)

@@ -19,7 +19,7 @@ from typing import Any
 from packaging.utils import canonicalize_name
 
 from derain.errors import InputError
-from derain.files.atomic import replacing
+from derain.files.atomic import write_text
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 CONSTRAINTS = REPOSITORY / "constraints.txt"
@@ -86,8 +86,7 @@ def main() -> None:
     lines = CONSTRAINTS.read_text("utf-8").splitlines()
     torch = next(line for line in lines if line.startswith("torch=="))
     packages = locked(resolved(torch))
-    with replacing(CONSTRAINTS) as temporary:
-        temporary.write_text(HEADER + "\n".join(packages) + "\n", "utf-8")
+    write_text(CONSTRAINTS, HEADER + "\n".join(packages) + "\n")
     print(f"{CONSTRAINTS.name}: {len(packages)} packages")
 
 

@@ -11,7 +11,7 @@ from benchmarks.sensor_table.columns import Column, table
 from benchmarks.sensor_table.measure import SIZE, TIME, Measurement
 from derain.export.bench.report import group_of
 from derain.export.timing import processor, versions
-from derain.files.atomic import replacing
+from derain.files.atomic import write_text
 from derain.pictures.scan_pictures import save
 from derain.pictures.speed_error import Standing, speed_error_figure
 
@@ -68,8 +68,7 @@ def report(measurement: Measurement, out: Path, turned: bool, notes: Sequence[st
         "table.md": text,
         "table.json": json.dumps(content, indent=1, allow_nan=False),
     }.items():
-        with replacing(out / name) as temporary:
-            temporary.write_text(written + "\n", "utf-8")
+        write_text(out / name, written + "\n")
     _draw(measurement, {column.title: column for column in columns}, out / "speed_error.png")
 
 

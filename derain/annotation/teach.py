@@ -27,7 +27,7 @@ from derain.annotation.manifest import (
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.answers import NOT_KNOWN, TEACHERS_ANSWERS, Answers, TruthRecord
-from derain.files.atomic import replacing, temporary_folder, writing
+from derain.files.atomic import replacing, temporary_folder, write_text, writing
 from derain.files.labels import LABEL, write_labels
 from derain.jobs.job import FOLDER
 from derain.jobs.running import IsThere, Submits, Task, completed, run
@@ -287,8 +287,7 @@ def write_card(path: Path, teacher: str, scans: DataCard | None) -> None:
     if scans is not None:
         for name in ("intensity_unit", "simulated", "deduplicate"):
             card[name] = getattr(scans, name)
-    with replacing(path) as temporary:
-        temporary.write_text(yaml.safe_dump(card, sort_keys=False, allow_unicode=True), "utf-8")
+    write_text(path, yaml.safe_dump(card, sort_keys=False, allow_unicode=True))
 
 
 def refuse_to_overwrite(out: Path, source: Source) -> None:

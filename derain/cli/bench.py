@@ -39,7 +39,7 @@ from derain.cli.outputs import print_lines
 from derain.cli.parser import Parser
 from derain.errors import InputError
 from derain.evaluation.published_tables import TABLES, paper_table, scans_by_group
-from derain.files.atomic import replacing, require_writable
+from derain.files.atomic import require_writable, write_text
 from derain.sources.frame import Frame
 from derain.sources.source import Frames
 from derain.sources.spread import evenly_spaced
@@ -154,8 +154,7 @@ def main(arguments: argparse.Namespace) -> int:
     if len(ours) < len(benches):
         return 0
     text = with_published_rows(table, ours, data.card)
-    with replacing(arguments.out / f"{arguments.paper}.md") as temporary:
-        temporary.write_text(text + "\n", "utf-8")
+    write_text(arguments.out / f"{arguments.paper}.md", text + "\n")
     print_lines(text)
     return 0
 

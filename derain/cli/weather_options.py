@@ -12,7 +12,7 @@ import numpy as np
 
 from derain.cli.options import count
 from derain.errors import InputError
-from derain.files.atomic import replacing, require_writable
+from derain.files.atomic import require_writable, write_text
 from derain.files.reading import is_file, reading
 from derain.sources.folders import named_frames
 from derain.sources.spread import evenly_spaced
@@ -137,8 +137,7 @@ def weather_table(path: Path | None) -> Iterator[list[Sequence[object]]]:
     finally:  # scans cleaned before an error or the end of a pipe have their lines
         table = io.StringIO()
         csv.writer(table, lineterminator="\n").writerows([TABLE_HEAD, *rows])
-        with replacing(path) as temporary:
-            temporary.write_text(table.getvalue(), "utf-8", newline="")
+        write_text(path, table.getvalue(), newline="")
 
 
 def _dry_reach(

@@ -50,6 +50,21 @@ def replacing(path: Path) -> Iterator[Path]:
             os.replace(temporary, target)
 
 
+def write_text(path: Path, text: str, newline: str | None = None) -> None:
+    """Writes a text in UTF-8, whole or not at all; see :func:`replacing`.
+
+    Args:
+        path: The file to write.
+        text: Its content.
+        newline: What an end of line becomes; None for that of the system.
+
+    Raises:
+        InputError: As for :func:`replacing`.
+    """
+    with replacing(path) as temporary:
+        temporary.write_text(text, "utf-8", newline=newline)
+
+
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
     """Turns the errors of writing `path` into an InputError.

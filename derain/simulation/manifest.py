@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from derain.errors import InputError
-from derain.files.atomic import replacing
+from derain.files.atomic import write_text
 from derain.files.documents import Entry
 from derain.simulation.rain_field import HARDEST_RAIN
 
@@ -104,8 +104,7 @@ def write_manifest(root: Path, content: Mapping[str, Any]) -> None:
     Raises:
         InputError: It cannot be written.
     """
-    with replacing(root / MANIFEST) as temporary:
-        temporary.write_text(json.dumps(content, indent=2) + "\n", "utf-8")
+    write_text(root / MANIFEST, json.dumps(content, indent=2) + "\n")
 
 
 def checksums(folder: Path, root: Path) -> dict[str, str]:

@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 
 from derain.cards.card import load_card
 from derain.files import write_scan
-from derain.files.atomic import replacing
+from derain.files.atomic import replacing, write_text
 from derain.files.extrinsics import POSE, Extrinsics
 from derain.files.frame_times import FRAME_COLUMNS, METADATA
 from derain.files.labels import write_labels
@@ -93,8 +93,7 @@ def _write_mounting(folder: Path, radar: Radar, sensor: Sensor) -> Extrinsics:
     if any(sensor.tilt):
         mounting = Extrinsics(sensor.mounting.T @ mounting.matrix)
         written = {"matrix": mounting.matrix.tolist()}
-    with replacing(folder / "extrinsics.yaml") as temporary:
-        temporary.write_text(yaml.safe_dump(written, sort_keys=False), "utf-8")
+    write_text(folder / "extrinsics.yaml", yaml.safe_dump(written, sort_keys=False))
     return mounting
 
 
@@ -143,8 +142,7 @@ def _stems(count: int) -> list[str]:
 
 def _write_times(folder: Path, times: Floats) -> None:
     rows = [f"{stem},{time:.6f}" for stem, time in zip(_stems(len(times)), times, strict=True)]
-    with replacing(folder / METADATA) as temporary:
-        temporary.write_text("\n".join([",".join(FRAME_COLUMNS), *rows]) + "\n", "utf-8")
+    write_text(folder / METADATA, "\n".join([",".join(FRAME_COLUMNS), *rows]) + "\n")
 
 
 def _write_poses(folder: Path, poses: Sequence[Floats]) -> None:

@@ -13,7 +13,7 @@ from numpy.random import Generator
 from derain.cards.card import load_card
 from derain.errors import InputError
 from derain.files import write_scan
-from derain.files.atomic import replacing
+from derain.files.atomic import write_text
 from derain.files.documents import Entry, packaged, packaged_or_own
 from derain.files.labels import write_labels
 from derain.scan import Scan
@@ -174,6 +174,5 @@ class WorldCampaign(SplitSequences):
         assert scan.label is not None  # a simulated scan is labelled
         write_scan(folder / FOLDERS.scans / f"{STEM}.bin", scan)
         write_labels(folder / FOLDERS.labels / f"{STEM}.label", *unpacked(scan.label))
-        with replacing(folder / DRAWN_WORLDS) as temporary:
-            described = json.loads(json.dumps(drawn))
-            temporary.write_text(yaml.safe_dump(described, sort_keys=False), "utf-8")
+        described = json.loads(json.dumps(drawn))
+        write_text(folder / DRAWN_WORLDS, yaml.safe_dump(described, sort_keys=False))

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.files.atomic import replacing
+from derain.files.atomic import write_text
 from derain.files.extrinsics import ROTATION_TOLERANCE, Extrinsics
 from derain.files.reading import is_file
 from derain.sources.number_lines import finite_numbers, read_lines, read_numbers
@@ -155,8 +155,7 @@ def write_trajectory(path: Path, trajectory: Trajectory) -> None:
             f"{time:.6f} {_words(pose[:3, 3])} {_words(quaternion_of(pose[:3, :3]))}"
             for time, pose in zip(trajectory.times, trajectory.poses, strict=True)
         ]
-    with replacing(path) as temporary:
-        temporary.write_text("".join(f"{line}\n" for line in lines), "utf-8")
+    write_text(path, "".join(f"{line}\n" for line in lines))
 
 
 def _words(numbers: NDArray[np.float64]) -> str:

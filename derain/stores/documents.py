@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 
-from derain.files.atomic import replacing, temporary_folder, writing
+from derain.files.atomic import temporary_folder, write_text, writing
 from derain.stores.objects import AT_ONCE, opened, tried
 from derain.stores.url import Place, is_url
 
@@ -55,8 +55,7 @@ class FileDocuments:
         Raises:
             InputError: It cannot be written.
         """
-        with replacing(self._folder / name) as temporary:
-            temporary.write_text(text, "utf-8")
+        write_text(self._folder / name, text)
 
     def create(self, name: str, text: str) -> None:
         """Writes a document unless it exists; read it back to find which one was kept.

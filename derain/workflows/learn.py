@@ -11,7 +11,7 @@ from derain.errors import InputError
 from derain.export.methods import load_method, named_method, over_recording
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
-from derain.files.atomic import replacing, require_writable
+from derain.files.atomic import require_writable, write_text
 from derain.models.checkpoint import load_model
 from derain.recordings.posed import ODOMETRY, STANDING
 from derain.sources.folders import named_frames
@@ -169,8 +169,7 @@ def _clear(work: Path) -> None:
     require_writable(mark)
     for left in work.iterdir():
         shutil.rmtree(left) if left.is_dir() and not left.is_symlink() else left.unlink()
-    with replacing(mark) as temporary:
-        temporary.write_text("Written by derain learn, which clears this folder.\n", "utf-8")
+    write_text(mark, "Written by derain learn, which clears this folder.\n")
 
 
 def _warning_guard() -> Guard:

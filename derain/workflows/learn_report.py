@@ -6,7 +6,7 @@ from pathlib import Path
 
 from derain.evaluation.answers import Answers, AnswersOfScan, coarse_bands, total
 from derain.evaluation.text_tables import markdown_table, number_text
-from derain.files.atomic import replacing
+from derain.files.atomic import write_text
 from derain.pictures.answers import removed_figure, teacher_figure
 from derain.pictures.scan_pictures import save
 
@@ -128,8 +128,7 @@ def write_report(results: LearnResults) -> None:
         title = "Removed from held-out scans, by range"
         save(removed_figure(results.agreement, title), removed)
         results.pictures[removed] = "share removed by range"
-    with replacing(results.path) as temporary:
-        temporary.write_text(as_markdown(results), "utf-8")
+    write_text(results.path, as_markdown(results))
 
 
 def as_markdown(results: LearnResults) -> str:

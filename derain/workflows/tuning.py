@@ -20,7 +20,7 @@ from derain.export.tuning import (
     tune_filter,
     tune_threshold,
 )
-from derain.files.atomic import replacing
+from derain.files.atomic import write_text
 from derain.filters import filter_from
 from derain.filters.derainer import CANDIDATES
 from derain.sources.frame import Frame
@@ -137,5 +137,4 @@ def write_parameters(
         InputError: It cannot be written.
     """
     text = yaml.safe_dump({"method": method, **parameters}, sort_keys=False)
-    with replacing(path) as temporary:
-        temporary.write_text("".join(f"# {line}\n" for line in comments) + text, "utf-8")
+    write_text(path, "".join(f"# {line}\n" for line in comments) + text)

@@ -15,7 +15,7 @@ from derain.evaluation.text_tables import markdown_table, number_text
 from derain.export.bench.bench_entries import FILE_SIZE, LEARNT, TRIVIAL, BenchEntry
 from derain.export.bench.rows import Row
 from derain.export.timing import STAGES
-from derain.files.atomic import replacing
+from derain.files.atomic import write_text
 
 SIMULATED_IS_EASY = (
     "**Simulated data.** Simulated rain is easier to find than real rain: these figures are no "
@@ -60,8 +60,7 @@ def write_report(rows: Sequence[Row], facts: Mapping[str, Any], out: Path) -> No
         "bench.csv": as_csv(rows),
         "bench.md": as_markdown(rows, facts) + "\n",
     }.items():
-        with replacing(out / name) as temporary:
-            temporary.write_text(text, "utf-8")
+        write_text(out / name, text)
 
 
 def as_csv(rows: Sequence[Row]) -> str:

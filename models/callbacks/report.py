@@ -10,7 +10,7 @@ from derain.errors import printable
 from derain.evaluation.counts import SCORES, or_none
 from derain.evaluation.metrics import RainMetrics
 from derain.evaluation.text_tables import number_text
-from derain.files.atomic import replacing
+from derain.files.atomic import write_text
 from derain.models.base import DerainingModule
 
 
@@ -37,8 +37,7 @@ class TestReport(lightning.Callback):
                 logger.experiment.add_text("test", f"    {as_code}", model.trained_steps)
         if folder is not None:
             path = Path(folder) / "test.json"
-            with replacing(path) as temporary:
-                temporary.write_text(json.dumps(scores, indent=2) + "\n")
+            write_text(path, json.dumps(scores, indent=2) + "\n")
             print(printable(f"Written to {path}"))
 
 
