@@ -177,8 +177,8 @@ def labelled(
 
     Args:
         paths: Scans and folders of them, or the root of one data set.
-        arguments: The options, of which the data card, the columns and the scale of intensities
-            tell how the scans are read.
+        arguments: The options, of which those for the data card, the columns and the scale of
+            intensities are used.
         topic: Topic of point clouds in bags; None where the paths name it.
         distinct: True if points at one position count once; None follows the data card.
 
