@@ -25,6 +25,10 @@ LEAST_VALID = 0.01
 # Number of points, spread over all, for the checks of positions and units.
 SAMPLED = 1024
 
+# No sensor returns more than one in fifty points of a scan at one position, to the bit. They are
+# rays without a return, which were at the origin until the points were moved with their frame.
+MOST_AT_ONE_POSITION = SAMPLED // 50
+
 # Points lie this many times farther off than from one another: the sensor is not at the origin. A
 # sensor that sees no more than 11 degrees of a wall would come as near.
 OFF_CENTRE = 10.0
@@ -103,6 +107,11 @@ def viewpoint_issues(scan: Scan) -> Iterator[ScanIssue]:
             )
         return
     sample = scan.xyz.take(rows[:: -(-len(rows) // SAMPLED)], axis=0).astype(np.float64)
+    position, times = _commonest(sample)
+    if times > MOST_AT_ONE_POSITION:
+        yield _no_returns_issue(scan, position)
+        others = sample[(sample != position).any(axis=1)]
+        sample = others if len(others) else sample
     misplaced = [*_off_centre_issue(sample)] or [*_unit_issue(sample)]
     yield from misplaced
     if not misplaced:
@@ -119,6 +128,24 @@ def _map_issue(scan: Scan) -> Iterator[ScanIssue]:
             f"{beyond.sum():,} points are more than {LARGEST_COORDINATE:,.0f} m away and cannot be "
             "judged: subtract the sensor's position, as from coordinates of a map (UTM)",
         )
+
+
+def _commonest(sample: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
+    """The position, float64 (3,), that most of the points, float64 (M, 3), share; their number."""
+    positions, times = np.unique(sample, axis=0, return_counts=True)
+    return positions[times.argmax()], int(times.max())
+
+
+def _no_returns_issue(scan: Scan, position: NDArray[np.float64]) -> ScanIssue:
+    """The issue of a scan with many points at one position, float64 (3,)."""
+    number = np.count_nonzero((scan.xyz == position).all(axis=1))
+    x, y, z = position
+    return ScanIssue(
+        "many points at one position",
+        f"{number:,} points lie at ({x:g}, {y:g}, {z:g}) m, as rays without a return do in a frame "
+        "that is not the sensor's, and are judged like others: leave them out, or judge scans "
+        "before they are moved",
+    )
 
 
 def _off_centre_issue(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:

@@ -244,6 +244,16 @@ def test_few_points_are_almost_none(spinning, points) -> None:
     assert kinds(np.concatenate([spinning[::1000], np.zeros((7000, 3))])) == ["almost empty"]
 
 
+def test_rays_without_a_return_that_were_moved_with_their_frame_are_named(spinning) -> None:
+    nothing, moved = np.zeros((len(spinning) // 20, 3)), np.array([3.0, 0, 1])
+    assert kinds(np.concatenate([spinning, nothing])) == []  # they are at the origin
+    points = np.concatenate([nothing, spinning]) + moved
+    (issue,) = viewpoint_issues(Scan.of(points))
+    assert issue.kind == "many points at one position"
+    assert f"{len(nothing):,} points lie at (3, 0, 1) m" in issue.detail
+    assert kinds(np.repeat(spinning, 4, axis=0)) == []
+
+
 def test_a_scan_without_a_point_is_not_odd() -> None:
     for points in (np.zeros((0, 3)), np.zeros((500, 3)), np.full((500, 3), np.nan)):
         assert kinds(points) == []
