@@ -171,8 +171,8 @@ def view_in_window(
     if window.is_one_scan:
         return view(scan)
 
-    def placed(frame: Frame, scan: Scan) -> PlacedScan:
-        return PlacedScan(scan, frame.time, frame.pose)
+    def placed(frame: Frame, its_scan: Scan) -> PlacedScan:
+        return PlacedScan(its_scan, frame.time, frame.pose)
 
     # The window ends at gaps in a sequence.
     first = max(number - window.before, 0)

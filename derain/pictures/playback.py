@@ -172,10 +172,10 @@ class PlaybackWriter:
             self.file.log(place.image, rerun.SegmentationImage(image.astype(np.uint8)))
         self._write_share(place.share, rain, scan)
 
-    def clear(self, frame: Frame, *entities: str) -> None:
+    def clear(self, frame: Frame, *paths: str) -> None:
         """Clears entities at a frame, so that what the frame before has there does not stay."""
         self._set_time(frame)
-        self._clear(*entities)
+        self._clear(*paths)
 
     def _write_labels(self, labels: Labels, scan: Scan, found: LabelledRain | None) -> None:
         if found is None:

@@ -25,8 +25,9 @@ LEAST_VALID = 0.01
 # Number of points, spread over all, for the checks of positions and units.
 SAMPLED = 1024
 
-# No sensor returns more than one in fifty points of a scan at one position, to the bit. They are
-# rays without a return, which were at the origin until the points were moved with their frame.
+# More sampled points at one position, to the bit, are rays without a return, which were at the
+# origin until they were moved with their frame. In the scans that were looked at no two share a
+# position, and of returns that are written twice or four times hardly any are sampled twice.
 MOST_AT_ONE_POSITION = SAMPLED // 50
 
 # Points lie this many times farther off than from one another: the sensor is not at the origin. A

@@ -103,8 +103,8 @@ class DerainCLI(LightningCLI):
     """Lightning's command line for one method of the trainer, with the callbacks of every run.
 
     Args:
-        method: ``fit``, ``validate``, ``test`` or ``predict``. The options of the others are left
-            out, because each method takes a quarter of a second to prepare.
+        method: ``fit``, ``validate``, ``test`` or ``predict``. The options of the others, which
+            take time to prepare, are left out.
         options: The arguments of :class:`LightningCLI`.
     """
 
