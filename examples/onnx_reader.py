@@ -21,6 +21,7 @@ Points = NDArray[np.float32]  # (N, 4): x, y, z in metres, sensor frame; intensi
 Spec = dict[str, Any]
 
 LARGEST_COORDINATE, LARGEST_VALUE, SENTINEL, FEWEST_ALIKE = 1e6, 1e7, -1.0, 100
+MOST_COPIES = 50
 
 # Steps within 5 × 5 pixels: to the pixel itself, then the nearest, then row by row.
 STEPS = sorted(
@@ -190,11 +191,19 @@ def neighbour_view(points: Points, spec: Spec) -> tuple[dict[str, NDArray[Any]],
 def distinct_points(points: Points) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Rows of the distinct positions along the curve, and of each row its position's number."""
     rows = along_the_curve(points, np.flatnonzero(valid_rows(points)))
-    elsewhere = np.ones(len(rows), bool)
-    elsewhere[1:] = (points[rows[1:], :3] != points[rows[:-1], :3]).any(axis=1)
+    position = np.cumsum(is_elsewhere(points, rows)) - 1
+    rows = rows[np.bincount(position)[position] <= MOST_COPIES]
+    elsewhere = is_elsewhere(points, rows)
     first, inverse = rows[elsewhere], np.full(len(points), -1)
     inverse[rows] = np.cumsum(elsewhere) - 1
     return first, inverse
+
+
+def is_elsewhere(points: Points, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """True for each of the rows that is not at the position of the one before it."""
+    elsewhere = np.ones(len(rows), bool)
+    elsewhere[1:] = (points[rows[1:], :3] != points[rows[:-1], :3]).any(axis=1)
+    return elsewhere
 
 
 def along_the_curve(points: Points, rows: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -13,6 +13,11 @@ from derain.scan import Scan
 
 BITS_PER_AXIS = 16
 
+# Rows at one position are copies of one point, up to this many. More are rays without a return,
+# which were at the origin until they were moved with their frame.
+# Source: modelling choice; a converter writes a return a few times at most.
+MOST_COPIES = 50
+
 
 def _spread(values: NDArray[np.uint64]) -> NDArray[np.uint64]:
     """Moves bit i of every value to bit 3 i."""
@@ -114,8 +119,8 @@ def distinct_rows(scan: Scan) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
     Returns:
         ``first``, int64 (M,): the lowest row at each position, along a Morton curve; and
-        ``inverse``, int64 (N,): for every row the number of its position, -1 for invalid rows.
-        Both are read-only.
+        ``inverse``, int64 (N,): for every row the number of its position; -1 for invalid rows, and
+        at positions of more than MOST_COPIES rows, which are left out. Both are read-only.
     """
     found = _of_last_scan.get(scan)
     if found is None:
@@ -134,16 +139,20 @@ _of_last_scan: WeakKeyDictionary[Scan, tuple[NDArray[np.int64], NDArray[np.int64
 def _distinct_rows(scan: Scan) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     valid = np.flatnonzero(scan.valid)
     # take is four times faster than indexing for rows of three numbers.
-    first, inverse_of_valid = distinct_positions(scan.xyz.take(valid, axis=0))
+    first, position = distinct_positions(scan.xyz.take(valid, axis=0))
+    are_copies = np.bincount(position) <= MOST_COPIES
+    if not are_copies.all():
+        first = first[are_copies]
+        position = np.where(are_copies, np.cumsum(are_copies) - 1, -1)[position]
     inverse = np.full(len(scan), -1, np.int64)
-    inverse[valid] = inverse_of_valid
+    inverse[valid] = position
     first = valid[first]
     first.flags.writeable = inverse.flags.writeable = False
     return first, inverse
 
 
 def first_rows(scan: Scan) -> NDArray[np.int64]:
-    """The first row at each distinct position, ascending; invalid rows are left out.
+    """The first row at each distinct position, ascending; the rest as :func:`distinct_rows`.
 
     Args:
         scan: The scan.

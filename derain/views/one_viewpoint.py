@@ -144,8 +144,8 @@ def _no_returns_issue(scan: Scan, position: NDArray[np.float64]) -> ScanIssue:
     return ScanIssue(
         "many points at one position",
         f"{number:,} points lie at ({x:g}, {y:g}, {z:g}) m, as rays without a return do in a frame "
-        "that is not the sensor's, and are judged like others: leave them out, or judge scans "
-        "before they are moved",
+        "that is not the sensor's: leave them out, or judge scans before they are moved (only "
+        "networks of range images judge such points)",
     )
 
 

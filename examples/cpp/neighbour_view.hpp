@@ -17,6 +17,9 @@
 
 namespace derain {
 
+// More rows at one position are rays without a return, as in derain/views/morton.py.
+constexpr std::ptrdiff_t kMostCopies = 50;
+
 // M points, of F of which there are neighbourhoods of k. Without candidates F = M, and each point
 // is scored; with them, J are, and `candidates` holds where the neighbourhoods lie that they need.
 struct NeighbourView {
@@ -113,16 +116,28 @@ inline std::vector<CodedRow> along_the_curve(const Scan& scan, const std::vector
   return rows;
 }
 
-// Finds which rows are at one position: the first of each, and the position of every row.
+// Finds which rows are at one position: the first of each, and the position of every row; -1 where
+// more rows share it than there are copies of a point.
 inline void find_points(const Scan& scan, const std::vector<bool>& valid,
                         std::vector<std::int64_t>& first, std::vector<std::int64_t>& inverse) {
   inverse.assign(scan.size(), -1);
-  const float* before = nullptr;
-  for (const auto& [code, row] : along_the_curve(scan, valid)) {
-    const float* here = scan.row(static_cast<std::size_t>(row));
-    if (before == nullptr || !std::equal(here, here + 3, before)) first.push_back(row);
-    inverse[static_cast<std::size_t>(row)] = static_cast<std::int64_t>(first.size()) - 1;
-    before = here;
+  const std::vector<CodedRow> rows = along_the_curve(scan, valid);
+  const auto position = [&](const CodedRow& coded) {
+    return scan.row(static_cast<std::size_t>(coded.row));
+  };
+  for (auto lowest = rows.cbegin(); lowest != rows.cend();) {
+    const float* here = position(*lowest);
+    const auto next = std::find_if(lowest, rows.cend(), [&](const CodedRow& other) {
+      return !std::equal(here, here + 3, position(other));
+    });
+    if (next - lowest <= kMostCopies) {
+      const auto number = static_cast<std::int64_t>(first.size());
+      for (auto copy = lowest; copy != next; ++copy) {
+        inverse[static_cast<std::size_t>(copy->row)] = number;
+      }
+      first.push_back(lowest->row);
+    }
+    lowest = next;
   }
 }
 

@@ -37,7 +37,8 @@ def hard_points() -> NDArray[np.float32]:
         [9, 1, 1, nan],
         [9, 2, 1, 2e7],
     ]
-    parts = (scene(500), lattice, again, zeros, behind, [[-1, -1, -1, 5]], invalid)
+    no_returns = [[3.0, 0, 0.5, 0]] * 60
+    parts = (scene(500), lattice, again, zeros, behind, no_returns, [[-1, -1, -1, 5]], invalid)
     points = np.concatenate([np.asarray(part, np.float32) for part in parts])
     return generator.permutation(points)
 

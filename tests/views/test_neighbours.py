@@ -74,6 +74,20 @@ def test_distinct_rows_are_those_of_the_rows_that_can_be_judged(xyz, random) -> 
     np.testing.assert_array_equal(scan.xyz[first][inverse[scan.valid]], scan.xyz[scan.valid])
 
 
+@given(gridded, st.randoms(use_true_random=False))
+def test_a_position_of_more_rows_than_copies_is_no_point(xyz, random) -> None:
+    place = np.float32([[9, 0, 1]])
+    some, many = (np.vstack([xyz, np.repeat(place, n, axis=0)]) for n in (50, 51))
+    order = random.sample(range(len(many)), len(many))
+    assert (distinct_rows(Scan(some))[1] >= 0).sum() == Scan(xyz).valid.sum() + 50
+    first, inverse = distinct_rows(Scan(many[order]))
+    at_place = (many[order] == place).all(axis=1)
+    np.testing.assert_array_equal(inverse < 0, ~Scan(many[order]).valid | at_place)
+    assert not at_place[first].any()
+    seen = inverse >= 0
+    np.testing.assert_array_equal(many[order][first][inverse[seen]], many[order][seen])
+
+
 def test_equal_points_apart_in_one_crowded_cell_are_found() -> None:
     # Two outliers share a cell: they make the cells 15 cm wide, so that all other points share one.
     rng = np.random.default_rng(0)
