@@ -153,10 +153,9 @@ def in_steps(
         whichever side, and how far up; float (NEIGHBOUR_NUMBERS, k - 1, S). And the logarithms of
         the points' ranges over 10 m, float (S,).
     """
-    axes = points.unbind(1)
-    x, y, z = (taken(axis, neighbours[0]) for axis in axes)
-    around = [taken(axis, neighbours[1:]) for axis in axes]
-    ahead, left, up = around[0] - x, around[1] - y, around[2] - z
+    places = taken_of_each(points.T, neighbours.flatten()).reshape(3, *neighbours.shape)
+    x, y, z = places[:, 0]
+    ahead, left, up = places[:, 1:] - places[:, :1]
     level = (x * x + y * y).sqrt().clamp_min(NEAREST_TO_AXIS)
     distance = (x * x + y * y + z * z).sqrt().clamp_min(NEAREST_POINT)
     level_dot = x * ahead + y * left
@@ -181,6 +180,8 @@ def taken(values: Tensor, numbers: Tensor) -> Tensor:
 
     It is ``values[numbers]``, in a form that onnxruntime computes a dozen times faster.
     """
+    if numbers.ndim == 1:
+        return values.gather(0, numbers)
     return values.gather(0, numbers.flatten()).reshape(numbers.shape)
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import torch
 from torch import Tensor, nn
@@ -16,6 +17,7 @@ from derain.models.cues.geometry import (
     taken_of_each,
 )
 from derain.views.intensity_rank import INTENSITY_RANKS
+from derain.views.isolated_points import SHELLS
 
 # Log-odds are cut to this either way; those of crowded neighbours are taken to be the second.
 CERTAIN, OF_CROWDED = 12.0, -8.0
@@ -145,9 +147,7 @@ class CueNetwork(nn.Module):
         cues = Cues(far, cell, distances, neighbours, others, counts, doubtful)
         answers, features = [rain], taken_of_each(features, doubtful)
         for fusion in self.rounds:
-            with torch.no_grad():
-                given = cues.around(answers[-1])
-            weighed = fusion(torch.cat([given, features]))[0]
+            weighed = fusion(torch.cat([cues.around(answers[-1].detach()), features]))[0]
             answers.append(rain.scatter(0, doubtful, weighed))
         size = counts.double().sum()
         if_unknown = self.without_intensity * (counts[:, 1:].sum() == 0).to(rain.dtype)
@@ -208,19 +208,18 @@ class Cues:
         counts: Tensor,
         doubtful: Tensor,
     ) -> None:
-        self._counts, self._doubtful = counts, doubtful
+        self._doubtful = doubtful
         self._cell_of_isolated = taken(cell, neighbours[0])
+        self._calibration = Calibration(counts, self._cell_of_isolated)
         self._cell = taken(self._cell_of_isolated, doubtful)
         around = slice(1, APART[-1] + 1)
         self._others = taken_of_each(others[around], doubtful)
         self._cell_of_others = taken(cell, taken_of_each(neighbours[around], doubtful))
-        self._rank = self._cell % INTENSITY_RANKS
-        self._rank_of_others = self._cell_of_others % INTENSITY_RANKS
         # Shifted and scaled, here and below, so that all numbers are of the order of 1.
         far = taken(far, doubtful)
         range_ = (USUAL_RANGE * far.exp()).clamp_min(NEAREST_POINT)
         apart = taken_of_each(distances[APART, :], doubtful) / range_
-        rank = self._rank.to(far.dtype) / (INTENSITY_RANKS - 1)
+        rank = (self._cell % INTENSITY_RANKS).to(far.dtype) / (INTENSITY_RANKS - 1)
         self._places = torch.cat(
             [(far + 0.3)[None], torch.log(apart + NEAREST_APART) + 4, rank[None]]
         )
@@ -233,64 +232,41 @@ class Cues:
                 brightness.
         """
         rain = rain.clamp(-CERTAIN, CERTAIN)
-        cell = self._cell_of_isolated
-        first = calibrated(self._counts, cell, rain.sigmoid()).log_odds
-        second = calibrated(self._counts, cell, (rain + SHARE_ADDED * taken(first, cell)).sigmoid())
-        own = taken(rain, self._doubtful)
-        of_all = torch.cat([rain, rain.new_full((1,), OF_CROWDED)])
-        of_others = taken(of_all, self._others)
-        brightness = taken(second.log_odds, self._cell_of_others)
-        of_scan = torch.log1p(rain.sigmoid().double().sum()).to(rain.dtype)
-        return torch.stack(
+        of_geometry = self._calibration(rain.sigmoid())
+        first = of_geometry.log_odds[:-1].flatten().to(rain.dtype)
+        with_first = rain + SHARE_ADDED * taken(first, self._cell_of_isolated)
+        by_cell = self._calibration(with_first.sigmoid()).by_cell().to(rain.dtype)
+        brightness, of_scan, *of_shell, separation = taken_of_each(by_cell, self._cell).split(1)
+        own = taken(rain, self._doubtful)[None]
+        with_crowded = torch.cat([rain, rain.new_full((1,), OF_CROWDED)])
+        others = taken(with_crowded, self._others)
+        brightness_of_others = taken(by_cell[0], self._cell_of_others)
+        of_scan_of_others = taken(by_cell[1], self._cell_of_others)
+        drops = of_geometry.rain[-1].sum().log1p().to(rain.dtype)
+        return torch.cat(
             [
                 own / 4,
-                taken(second.log_odds, self._cell) / 2,
-                taken(first, self._cell) / 2,
-                of_others.mean(dim=0) / 4,
-                brightness.mean(dim=0) / 2,
-                of_others.sigmoid().mean(dim=0),
-                of_others.amax(dim=0) / 4,
-                brightness.amax(dim=0) / 2,
-                of_others.amin(dim=0) / 4,
-                brightness.amin(dim=0) / 2,
-                taken(_of_every_rank(torch.log1p(second.rain)), self._cell) / 4,
-                taken(_of_every_rank(second.separation), self._cell),
-                taken(_of_every_rank(second.share), self._cell),
-                (of_scan / 4).expand_as(own),
-                taken(second.at_any_range, self._rank) / 2,
-                taken(second.at_any_range, self._rank_of_others).mean(dim=0) / 2,
-                second.separation_at_any_range.expand_as(own),
-                *self._places,
+                brightness,
+                taken(first, self._cell)[None] / 2,
+                others.mean(dim=0, keepdim=True) / 4,
+                brightness_of_others.mean(dim=0, keepdim=True),
+                others.sigmoid().mean(dim=0, keepdim=True),
+                others.amax(dim=0, keepdim=True) / 4,
+                brightness_of_others.amax(dim=0, keepdim=True),
+                others.amin(dim=0, keepdim=True) / 4,
+                brightness_of_others.amin(dim=0, keepdim=True),
+                *of_shell,
+                (drops / 4).expand_as(own),
+                of_scan,
+                of_scan_of_others.mean(dim=0, keepdim=True),
+                separation,
+                self._places,
             ]
         )
 
 
-@dataclass(frozen=True)
-class Brightness:
-    """The calibration of intensities in one scan.
-
-    Attributes:
-        log_odds: Log-odds of rain by shell and rank of intensity, 0 where that means nothing, float
-            (SHELLS * INTENSITY_RANKS,).
-        rain: Points of rain in each shell, float (SHELLS,).
-        separation: How well intensity tells rain from the rest in each shell: the mean of the
-            log-odds over its rain, float (SHELLS,).
-        share: Share of rain in each shell, float (SHELLS,).
-        at_any_range: Log-odds of rain by rank of intensity alone, over all shells, for shells that
-            hold few drops; float (INTENSITY_RANKS,).
-        separation_at_any_range: The mean of these over all rain, float ().
-    """
-
-    log_odds: Tensor
-    rain: Tensor
-    separation: Tensor
-    share: Tensor
-    at_any_range: Tensor
-    separation_at_any_range: Tensor
-
-
-def calibrated(counts: Tensor, cell: Tensor, probability: Tensor) -> Brightness:
-    """Calibrates intensities by points that may be rain; all others are assumed not to be.
+class Calibration:
+    """Calibrates the intensities of one scan by points that may be rain.
 
     How bright rain is depends on the sensor, and no training shows it. The scan does: where most of
     its points are judged well without intensity, histograms over them show how bright rain is here,
@@ -298,62 +274,83 @@ def calibrated(counts: Tensor, cell: Tensor, probability: Tensor) -> Brightness:
 
     Args:
         counts: Points of the scan by shell and rank, float (SHELLS, INTENSITY_RANKS).
-        cell: Shell and rank of those that may be rain, int64 (S,).
-        probability: Their probabilities of rain, float (S,).
+        cell: Shell and rank of those that may be rain, int64 (S,); all others are assumed not to
+            be.
     """
-    # In float64, for sums of float32 over a whole scan differ from one runtime to another.
-    rain = counts.new_zeros(counts.numel(), dtype=torch.float64)
-    rain = _smoothed(rain.scatter_add(0, cell, probability.double()).reshape(counts.shape))
-    rest = (_smoothed(counts.double()) - rain).clamp_min(0)
-    log_odds, separation = _log_odds(rain, rest)
-    at_any_range, separation_at_any_range = _log_odds(rain.sum(0)[None], rest.sum(0)[None])
-    rain_in_shell = rain.sum(1)
-    results = (
-        log_odds.flatten(),
-        rain_in_shell,
-        separation,
-        rain_in_shell / (rain_in_shell + rest.sum(1) + 1),
-        at_any_range[0],
-        separation_at_any_range[0],
-    )
-    return Brightness(*(result.to(probability.dtype) for result in results))
+
+    def __init__(self, counts: Tensor, cell: Tensor) -> None:
+        self._cell = cell
+        self._to_shells, self._to_ranks = (by.to(counts.device) for by in (TO_SHELLS, TO_RANKS))
+        # In float64, for sums of float32 over a whole scan differ from one runtime to another.
+        self._points = self._smoothed(counts.double())
+
+    def __call__(self, probability: Tensor) -> "Brightness":
+        """Histograms by the points' probabilities of rain, float (S,)."""
+        rain = self._points.new_zeros(SHELLS * INTENSITY_RANKS)
+        rain = rain.scatter_add(0, self._cell, probability.double())
+        rain = self._smoothed(rain.reshape(SHELLS, INTENSITY_RANKS))
+        return Brightness(rain, (self._points - rain).clamp_min(0))
+
+    def _smoothed(self, counts: Tensor) -> Tensor:
+        """Half of each count spread to those beside it; the sum of all shells in the last row."""
+        return self._to_shells @ counts @ self._to_ranks
 
 
-def _of_every_rank(of_shells: Tensor) -> Tensor:
-    """One number of each shell, repeated for its ranks, float (SHELLS * INTENSITY_RANKS,).
-
-    So that no cell has to be divided into shell and rank: runtimes that compute in bfloat16 divide
-    whole numbers in it, too.
-    """
-    return of_shells[:, None].expand(-1, INTENSITY_RANKS).flatten()
+def _spread(size: int) -> Tensor:
+    """Spreads half of each of so many counts to the two beside it, float64 (size, size)."""
+    beside = torch.diag(torch.full((size - 1,), 0.25, dtype=torch.float64), 1)
+    beside = beside + beside.T
+    return beside + torch.diag(1 - beside.sum(0))
 
 
-def _log_odds(rain: Tensor, rest: Tensor) -> tuple[Tensor, Tensor]:
-    """Log-odds of rain by rank of intensity, and their mean over the rain, of each shell.
+TO_SHELLS = torch.cat([_spread(SHELLS), torch.ones(1, SHELLS, dtype=torch.float64)])
+TO_RANKS = _spread(INTENSITY_RANKS)
 
-    Args:
-        rain: Points of rain by shell and rank, float (shells, INTENSITY_RANKS).
+
+@dataclass(frozen=True)
+class Brightness:
+    """Histograms of the rain of one scan, and of the rest of it.
+
+    Attributes:
+        rain: Points of rain by shell and rank of intensity, and in the last row those of all
+            shells, float64 (SHELLS + 1, INTENSITY_RANKS).
         rest: All other points, as ``rain``.
-
-    Returns:
-        Float (shells, INTENSITY_RANKS) and (shells,).
     """
-    all_rain, all_rest = rain.sum(1, keepdim=True), rest.sum(1, keepdim=True)
-    points = all_rain + all_rest
-    usual = (rain + rest + LEAST_COUNT) / (points + LEAST_COUNT * INTENSITY_RANKS)
-    of_rain = (rain + PSEUDO_POINTS * usual) / (all_rain + PSEUDO_POINTS)
-    of_rest = (rest + PSEUDO_POINTS * usual) / (all_rest + PSEUDO_POINTS)
-    log_odds = (of_rain.log() - of_rest.log()).clamp(-LARGEST_LOG_ODDS, LARGEST_LOG_ODDS)
-    return log_odds, (of_rain * log_odds).sum(1)
 
+    rain: Tensor
+    rest: Tensor
 
-def _smoothed(counts: Tensor) -> Tensor:
-    """Counts by shell and rank with half of each spread to the four beside it; sums stay."""
-    return _along(_along(counts).T).T
+    @cached_property
+    def log_odds(self) -> Tensor:
+        """Log-odds of rain, 0 where intensity means nothing, as ``rain``."""
+        odds = self._share(self.rain).log() - self._share(self.rest).log()
+        return odds.clamp(-LARGEST_LOG_ODDS, LARGEST_LOG_ODDS)
 
+    def by_cell(self) -> Tensor:
+        """What is known of each shell and rank together, float64 (6, SHELLS * INTENSITY_RANKS).
 
-def _along(rows: Tensor) -> Tensor:
-    """Each row with half of it spread to the rows beside it."""
-    before = torch.cat([rows[:1], rows[:-1]])
-    after = torch.cat([rows[1:], rows[-1:]])
-    return 0.5 * rows + 0.25 * (before + after)
+        Log-odds of rain by shell and rank, and by rank alone, for shells that hold few drops;
+        the points of rain in the shell; how well intensity tells its rain from the rest; its share
+        of rain; and how well intensity tells rain from the rest in the whole scan.
+        """
+        separation = (self._share(self.rain) * self.log_odds).sum(1, keepdim=True)
+        rain, rest = (each[:-1].sum(1, keepdim=True) for each in (self.rain, self.rest))
+        numbers = torch.broadcast_tensors(
+            self.log_odds[:-1] / 2,
+            self.log_odds[-1:] / 2,
+            rain.log1p() / 4,
+            separation[:-1],
+            rain / (rain + rest + 1),
+            separation[-1:],
+        )
+        return torch.stack(numbers).flatten(1)
+
+    @cached_property
+    def _usual(self) -> Tensor:
+        """Points as bright as all of each row, as ``rain``; see PSEUDO_POINTS."""
+        points = self.rain + self.rest + LEAST_COUNT
+        return PSEUDO_POINTS * points / points.sum(1, keepdim=True)
+
+    def _share(self, counts: Tensor) -> Tensor:
+        """Share of each row's points that each rank has, as ``rain``."""
+        return (counts + self._usual) / (counts.sum(1, keepdim=True) + PSEUDO_POINTS)

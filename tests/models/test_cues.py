@@ -18,7 +18,7 @@ from derain.export.runtime import Derainer
 from derain.learning.batch import Batch, Sample
 from derain.models.cues import CueFusion
 from derain.models.cues.geometry import in_steps
-from derain.models.cues.network import LARGEST_LOG_ODDS, calibrated
+from derain.models.cues.network import LARGEST_LOG_ODDS, Calibration
 from derain.models.outdet import OutDet
 from derain.scan import Scan
 from derain.views.intensity_rank import INTENSITY_RANKS
@@ -217,27 +217,26 @@ def test_log_odds_are_those_of_smoothed_counts(seed) -> None:
         rain[place] += p
         rest[place] += 1 - p
     rain, rest = smoothed(rain), smoothed(rest)
-    found = calibrated(counts, cell, probability)
-    log_odds = found.log_odds.reshape(SHELLS, INTENSITY_RANKS).numpy()
-    occurring = rain + rest > 0.1
-    np.testing.assert_allclose(log_odds[occurring], expected(rain, rest)[occurring], atol=1e-4)
-    np.testing.assert_allclose(found.rain, rain.sum(1), rtol=1e-9)
-    of_scan = expected(rain.sum(0)[None], rest.sum(0)[None])[0]
-    np.testing.assert_allclose(found.at_any_range, of_scan, atol=1e-4)
+    found = Calibration(counts, cell)(probability)
+    occurring = np.append(rain + rest > 0.1, np.ones((1, INTENSITY_RANKS), bool), axis=0)
+    rain, rest = (np.append(each, each.sum(0)[None], axis=0) for each in (rain, rest))
+    by_hand = expected(rain, rest)
+    np.testing.assert_allclose(found.log_odds[occurring], by_hand[occurring], atol=1e-4)
+    np.testing.assert_allclose(found.rain, rain, rtol=1e-9)
 
 
 def test_where_all_are_alike_or_none_is_rain_brightness_means_nothing() -> None:
     counts, cell, probability = drawn(0)
     darkest = cell - cell % INTENSITY_RANKS
-    alike = calibrated(counted(darkest), darkest, probability)
-    dry = calibrated(counts, cell, torch.zeros_like(probability))
-    assert alike.log_odds[darkest].abs().max() < 1e-6
-    assert dry.log_odds[cell].abs().max() < 1e-6
+    alike = Calibration(counted(darkest), darkest)(probability).by_cell()
+    dry = Calibration(counts, cell)(torch.zeros_like(probability)).by_cell()
+    assert alike[:2, darkest].abs().max() < 1e-6
+    assert dry[:2, cell].abs().max() < 1e-6
 
 
 def test_points_that_are_not_asked_about_count_as_no_rain() -> None:
     counts, cell, probability = drawn(1)
     asked = torch.arange(len(cell)) % 3 == 0
-    some = calibrated(counts, cell[asked], probability[asked])
-    every = calibrated(counts, cell, probability * asked)
-    torch.testing.assert_close(some.log_odds, every.log_odds)
+    some = Calibration(counts, cell[asked])(probability[asked])
+    every = Calibration(counts, cell)(probability * asked)
+    torch.testing.assert_close(some.by_cell(), every.by_cell())
