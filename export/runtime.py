@@ -259,7 +259,8 @@ class Derainer(Method):
         """Warnings about a scan for the model, and whether much of it lies outside its grid."""
         yield from intensity_in_places(judgement.scan, judgement.judged)
         yield from self.spec.issues(judgement.scan)
-        yield from outside_view(judgement.scan, judgement.judged, self.spec.data)
+        if "grid" in self.spec.view:
+            yield from outside_view(judgement.scan, judgement.judged, self.spec.data)
 
     def as_dict(self) -> dict[str, Any]:
         """The model's name, and its threshold."""

@@ -108,6 +108,15 @@ def test_rows_that_cannot_be_judged_are_not_rain_and_change_no_other(derainer) -
     np.testing.assert_array_equal(np.delete(probability, inserted), derainer.probability(points))
 
 
+def test_rays_without_a_return_that_moved_with_their_frame_are_left_alone(derainer) -> None:
+    points = scene(POINTS)
+    no_returns = np.tile(np.float32([[3, 0, 1, 0]]), (60, 1))
+    judgement = derainer.judge(np.concatenate([points, no_returns]))
+    np.testing.assert_array_equal(judgement.judged, np.arange(POINTS + 60) < POINTS)
+    np.testing.assert_array_equal(judgement.rain[:POINTS], derainer(points))
+    assert "points outside the grid" not in {one.kind for one in derainer.issues(judgement)}
+
+
 @settings(max_examples=20)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_neither_order_nor_copies_nor_threads_matter(derainer, onnx_model, seed) -> None:
