@@ -66,6 +66,7 @@ class WeatherMonitor:
         self._options = options
         self._alarm = options.new_alarm()
         self._recording: int | str = -1
+        self._is_known = False  # whether any scan of the recording shows how far one sees
         known = options.every_scan and knows_recordings
         self._recordings = recording_numbers(source) if known else {}
         sampled = 0 if options.every_scan or len(source) == 1 else SAMPLED_SCANS
@@ -117,12 +118,19 @@ class WeatherMonitor:
         return f"{text} ({levels}, by {by})"
 
     def _alarm_after(self, recording: int | str | None, weather: ScanWeather) -> Level | None:
-        """State of the alarm after a scan; None for a scan outside of any recording."""
+        """State of the alarm after a scan; None outside of any recording, and if nothing is known.
+
+        An alarm is clear before the first scan, but a sensor that returns nothing shows no clear
+        sight.
+        """
         if recording is None:
             return None
         if recording != self._recording:
             self._recording, self._alarm = recording, self._options.new_alarm()
-        return self._alarm.update(weather.visibility, weather.reach)
+            self._is_known = False
+        self._is_known |= weather.visibility.known or weather.reach.known
+        level = self._alarm.update(weather.visibility, weather.reach)
+        return level if self._is_known else None
 
 
 def recording_numbers(source: Sequence[Frame]) -> dict[str, int]:
