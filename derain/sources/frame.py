@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from derain.cards.mixed import LabelMap
 from derain.errors import InputError
+from derain.files.extrinsics import Extrinsics
 from derain.scan import Scan
 
 
@@ -167,7 +168,15 @@ class Frame(ABC):
 
         Args:
             pose: Sensor to world, float64 (4, 4), metres.
+
+        Raises:
+            InputError: A pose that is no rigid motion.
         """
+        try:
+            pose = Extrinsics(np.asarray(pose, np.float64)).matrix
+        except (TypeError, ValueError) as error:
+            reason = f"its pose is not rigid ({error})"
+            raise InputError(self.name, reason, "Give a rotation and metres.") from error
         return replace(self, sensor_to_world=pose)
 
     def with_intensity_times(self, factor: float) -> Self:

@@ -44,7 +44,7 @@ def read_lines(path: Path) -> list[str]:
         InputError: A file that cannot be read, or is too large.
     """
     with reading(path, ValueError):
-        return read_bytes(path, LARGEST_RECORD).decode("utf-8").splitlines()
+        return read_bytes(path, LARGEST_RECORD).decode("utf-8-sig").splitlines()
 
 
 def finite_numbers(path: Path, place: int, words: Sequence[str], count: int) -> list[float]:

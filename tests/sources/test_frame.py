@@ -100,6 +100,14 @@ def test_a_given_pose_goes_before_the_record_beside_the_scan(labelled) -> None:
         labelled.pose  # noqa: B018
 
 
+@pytest.mark.parametrize(
+    "pose", [np.zeros((4, 4)), 2 * np.eye(4), np.full((4, 4), np.nan), np.eye(3), "home"]
+)
+def test_a_pose_that_is_no_rigid_motion_is_refused(labelled, pose) -> None:
+    with pytest.raises(InputError, match="pose is not rigid"):
+        labelled.with_pose(pose)
+
+
 def test_a_scan_in_memory_is_a_frame_like_any(labelled) -> None:
     scan = Scan.of(scene(50), "mine").with_label(labelled.read_label(50))
     frame = MemoryFrame(key="0", scan=scan, seconds=1.5)

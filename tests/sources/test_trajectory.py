@@ -75,6 +75,12 @@ def tum(*lines: str) -> str:
     return "# time x y z qx qy qz qw\n" + "".join(f"{line}\n" for line in lines)
 
 
+def test_a_byte_order_mark_is_read_over(tmp_path) -> None:
+    path = tmp_path / "drive.txt"
+    path.write_text("1 0 0 2 0 1 0 3 0 0 1 4\n", "utf-8-sig")
+    assert read_trajectory(path).poses[0, :3, 3].tolist() == [2, 3, 4]
+
+
 def test_poses_by_time_are_found_at_their_times_and_between_them(tmp_path) -> None:
     half = np.sqrt(0.5)
     path = tmp_path / "drive.tum"
