@@ -76,7 +76,8 @@ def main(arguments: argparse.Namespace) -> int:
         else:
             print_error(found.fault)
     untrusted = sum(found.untrusted for found in recordings)
-    return exit_code(untrusted, len(source), "{scans} could not be registered")
+    code = exit_code(untrusted, len(source), "{scans} could not be registered")
+    return 2 if any(found.fault for found in recordings) else code
 
 
 def _print_registration(

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from recorded_scenes import write_scenes
 
+from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.sources.folders import named_frames
 from derain.sources.trajectory import read_trajectory
+from derain.workflows import odometry
 
 STEP = np.array([0.9, 0.05, 0.0])
 
@@ -129,6 +131,18 @@ def test_several_recordings_are_a_folder_of_files_but_of_those_that_fail(
     assert {path.name for path in out.iterdir()} == {"hall.txt", "other.txt"}
     found = read_trajectory(out / "other.txt").poses
     np.testing.assert_allclose(found[1, :3, 3], -STEP, atol=0.05)
+
+
+def test_poses_that_cannot_be_written_are_named_in_the_exit_code(
+    run_derain, recording, tmp_path, monkeypatch
+) -> None:
+    def full(*_: object) -> None:
+        raise InputError(tmp_path / "poses.txt", "cannot be written (full)", "Make room.")
+
+    monkeypatch.setattr(odometry, "_write", full)
+    outcome = run_derain("odometry", recording, "--out", tmp_path / "poses.txt")
+    assert outcome.code == 2
+    assert "poses.txt: cannot be written (full)" in outcome.err
 
 
 def test_recordings_of_one_name_are_refused(refused, recording, tmp_path) -> None:
