@@ -31,7 +31,7 @@ from derain.scan import Scan
 from derain.sources.bag_frame import BagFrame
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
-from derain.sources.judging import judgements
+from derain.sources.judging import Failures, judgements
 from derain.sources.reader import FrameReader
 from derain.sources.source import Source
 from derain.sources.spread import evenly_spaced
@@ -67,18 +67,18 @@ def teacher_answers(data: Taught) -> list[AnswersOfScan]:
 def beside_persistence(data: Taught, recording: Source) -> Answers:
     """Persistence's answers on held-out scans, and beside them what the teacher calls rain.
 
+    Neighbours of these that cannot be read are left out, as the teacher left them out.
+
     Args:
         data: The scans with the teacher's labels.
         recording: The same scans as the teacher saw them, in time order, with their poses where
             these are known.
-
-    Raises:
-        InputError: A scan that cannot be read.
     """
     taught = {frame.key: frame for frame in data.frames("validation")[:MOST_EVALUATED]}
     shown = tqdm(_with_neighbours(recording, taught), "comparing", disable=None)
     found = []
-    for frame, judgement, _ in judgements(PersistenceDerainer(), shown):
+    guard = Failures(lambda error: None).skipping_failures
+    for frame, judgement, _ in judgements(PersistenceDerainer(), shown, guard):
         if frame.key in taught:
             rain = answer_of(data.read(taught[frame.key]), data.card) == RAIN
             labelled = judgement.scan.with_label(labels_of(judgement))

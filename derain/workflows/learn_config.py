@@ -11,6 +11,8 @@ from derain.errors import InputError
 from derain.export.methods import CUES
 from derain.files import DEFAULT_COLUMNS
 from derain.recordings.posed import ODOMETRY
+from derain.scan import Scan
+from derain.sources.judging import Failures
 from derain.sources.source import Source
 from derain.spec import Spec
 from derain.workflows.configurations import packaged_configs
@@ -143,11 +145,11 @@ def student_of(config: LearnConfig, source: Source) -> Student:
         source: The scans; without intensities, the student is blind to them.
 
     Raises:
-        InputError: A first scan that cannot be read; a start that cannot be read, that lies in the
+        InputError: Scans none of which can be read; a start that cannot be read, that lies in the
             folder to be cleared, that is of another network, or that sees intensity where the
             student is to be blind or the scans have none.
     """
-    sees_intensity = source[0].read().intensity is not None and not config.blind
+    sees_intensity = _first_readable(source).intensity is not None and not config.blind
     start = config.begins_with
     if start is None:
         network = config.model or STUDENTS[0]
@@ -170,6 +172,15 @@ def student_of(config: LearnConfig, source: Source) -> Student:
         settings["model.channels"] = BLIND[network]
     usual = yaml.safe_load(packaged_configs()[file].read_text("utf-8"))["trainer"]["max_epochs"]
     return Student(network, blind, start, file, settings, config.epochs or int(usual))
+
+
+def _first_readable(source: Source) -> Scan:
+    """The first scan that can be read; raises the error of the first if none can."""
+    failures = Failures(lambda error: None)
+    for frame in source:
+        with failures.skipping_failures(frame):
+            return frame.read()
+    raise failures.errors[0]
 
 
 def _spec_of_start(config: LearnConfig, start: str) -> Spec:

@@ -54,6 +54,16 @@ def test_a_network_is_trained_by_its_configuration_without_intensity_where_it_is
     assert str(forced) == "outdet, blind to intensity"
 
 
+def test_the_first_scan_that_can_be_read_shows_whether_there_are_intensities(tmp_path) -> None:
+    scans = write_scans(tmp_path / "scans")
+    (tmp_path / "scans/0.bin").write_bytes(b"damaged")
+    assert student_of(config(tmp_path / "scans", model="outdet"), scans).sees_unit
+    (tmp_path / "scans/1.bin").write_bytes(b"damaged")
+    (tmp_path / "scans/2.bin").write_bytes(b"damaged")
+    with pytest.raises(InputError, match=r"0\.bin"):
+        student_of(config(tmp_path / "scans"), scans)
+
+
 @pytest.mark.parametrize("columns", [3, 4])
 def test_it_begins_with_the_model_of_derain_unless_another_is_named(tmp_path, columns) -> None:
     scans = write_scans(tmp_path / "scans", columns)
