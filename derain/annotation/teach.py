@@ -249,7 +249,7 @@ def _finish(work: Labelling, out: Path, known: Sequence[Frame]) -> Manifest:
     if not frames:
         raise InputError(
             out,
-            "nothing is written, because the method is sure of no point",
+            "nothing is written, because in every scan the method fails or is sure of no point",
             "Check that the method suits the scans: some need several scans of one recording.",
         )
     manifest = Manifest(
