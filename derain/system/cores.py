@@ -18,6 +18,10 @@ GROUPS = Path("/sys/fs/cgroup")
 # Source: Linux, Documentation/scheduler/sched-bwc.rst; Documentation/admin-guide/cgroup-v2.rst.
 QUOTA_FILES = (("cpu.cfs_quota_us", "cpu.cfs_period_us"), ("cpu.max",))
 
+# Threads that any machine may be asked for, as by a script that is written for a larger one. Of
+# thousands each takes memory and time, and the process no longer ends by a signal.
+MOST_ON_FEW_CORES = 64
+
 # How OpenMP's threads wait, which it reads once, when it is loaded.
 # Source: OpenMP 5.2, 21.7, OMP_WAIT_POLICY.
 WAIT_POLICY = "OMP_WAIT_POLICY"
@@ -36,13 +40,16 @@ def threads_of(threads: Any) -> int:
     """Number of threads for a user's option, in which 0 means one per core.
 
     Raises:
-        InputError: Anything but a whole number from 0 on.
+        InputError: Anything but a whole number from 0 on, or far more than there are cores.
     """
+    cores = usable_cores()
     if not isinstance(threads, Integral) or threads < 0:
-        raise InputError(
-            "threads", f"{threads!r} is not a whole number from 0 on", "Give 0 for every core."
-        )
-    return int(threads) or usable_cores()
+        reason = f"{threads!r} is not a whole number from 0 on"
+    elif threads > max(2 * cores, MOST_ON_FEW_CORES):
+        reason = f"{threads} are too many for {cores} cores"
+    else:
+        return int(threads) or cores
+    raise InputError("threads", reason, "Give 0 for every core.")
 
 
 @contextmanager
