@@ -48,13 +48,17 @@ def unbroken_recordings(frames: Iterable[Frame]) -> list[list[Frame]]:
     return [group for group in groups if len(group) > 1]
 
 
-def irregularities(frames: Iterable[Frame], window: Window) -> Iterator[str]:
+def irregularities(
+    frames: Iterable[Frame], window: Window, *, needed: bool = True
+) -> Iterator[str]:
     """Describes faults of recordings that harm a method that uses several scans.
 
     Args:
         frames: Frames in time order, one recording after the other.
-        window: Scans that the method needs. If it needs one, there are no faults, and nothing is
+        window: Scans that the method uses. If it uses one, there are no faults, and nothing is
             read.
+        needed: False if it can judge a scan without the others. Recordings may then be short and
+            have breaks, but not times that are damaged or do not rise.
 
     Yields:
         One sentence for each fault.
@@ -63,7 +67,7 @@ def irregularities(frames: Iterable[Frame], window: Window) -> Iterator[str]:
         return
     recordings = recordings_of(frames)
     short = [each for each in recordings if len(each) <= window.before + window.after]
-    if short:
+    if short and needed:
         others = f" ({len(short):,} recordings are as short)" if len(short) > 1 else ""
         yield (
             f"{short[0][0].name}: {_scans(len(short[0]))} in its recording{others}; the method "
@@ -71,7 +75,7 @@ def irregularities(frames: Iterable[Frame], window: Window) -> Iterator[str]:
             "without them"
         )
     for recording in recordings:
-        yield from _irregular_steps(recording)
+        yield from _irregular_steps(recording, needed)
 
 
 def _unbroken(recording: Sequence[Frame]) -> list[list[Frame]]:
@@ -94,7 +98,7 @@ def _unbroken(recording: Sequence[Frame]) -> list[list[Frame]]:
     return parts
 
 
-def _irregular_steps(recording: Sequence[Frame]) -> Iterator[str]:
+def _irregular_steps(recording: Sequence[Frame], needed: bool) -> Iterator[str]:
     """Describes the first step in time of each kind that harms the method."""
     try:
         times = times_of(recording)
@@ -108,7 +112,7 @@ def _irregular_steps(recording: Sequence[Frame]) -> Iterator[str]:
             f"{backwards[0].name}: not later than the scan before it ({_scans(len(backwards))} in "
             "all): name the scans in time order"
         )
-    if not times:
+    if not times or not needed:
         return
     apart = [frame for frame, step in zip(recording[1:], steps, strict=True) if step > LONGEST_STEP]
     if apart:

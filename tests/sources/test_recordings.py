@@ -87,12 +87,23 @@ def test_names_that_are_numbers_give_the_order_where_no_times_do(tmp_path) -> No
     assert "002.bin: not later than the scan before it (3 scans in all)" in sentence
 
 
+@pytest.mark.parametrize(
+    ("seconds", "parts"),
+    [((0.0, 0.1), []), ((0.0, 9.0, 9.1, 9.2), []), ((0.0, 0.0, 9.0), ["not later"])],
+)
+def test_a_method_that_can_do_without_other_scans_needs_times_that_rise(seconds, parts) -> None:
+    sentences = list(irregularities(frames(*seconds), SEVERAL, needed=False))
+    assert len(sentences) == len(parts)
+    assert all(part in sentence for part, sentence in zip(parts, sentences, strict=True))
+
+
 def test_damaged_times_are_named_and_no_more(tmp_path) -> None:
     write_scenes(tmp_path, 10, 10, 10, name="{}.bin")
     (tmp_path / "times.txt").write_text("soon\n")
-    (sentence,) = irregularities(named_frames([tmp_path]), SEVERAL)
-    assert "0.bin: " in sentence
-    assert "line 1 is not 1 number" in sentence
+    for needed in (False, True):
+        (sentence,) = irregularities(named_frames([tmp_path]), SEVERAL, needed=needed)
+        assert "0.bin: " in sentence
+        assert "line 1 is not 1 number" in sentence
 
 
 def test_short_recordings_are_named_in_one_sentence() -> None:
