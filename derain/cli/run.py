@@ -168,16 +168,16 @@ def main(arguments: argparse.Namespace) -> int:
     )
     with (
         sink,
-        weather_table(arguments.weather) as rows,
+        weather_table(arguments.weather, sink.targets()) as rows,
         noting_progress(sink.so_far),
         unit_options.executor_of(arguments, workers) as executor,
     ):
         printer = _Printer(arguments.out, rows, arguments.json)
         if name == DEFAULT:
             printer.introduce_default()
-        # Warnings concern methods that cannot work on one scan; a RecordedDerainer can.
         listed = (frame for frame in source if not isinstance(frame, StoredBag))
-        for sentence in irregularities(listed, single_scan_method.window):
+        needed = not single_scan_method.window.is_one_scan
+        for sentence in irregularities(listed, method.window, needed=needed):
             warn(sentence)
         report = clean(
             source,

@@ -3,8 +3,9 @@
 import argparse
 import csv
 import io
+import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -112,32 +113,42 @@ def warn_of_bad_weather(weather: WeatherMonitor, fail_at: str | None) -> int:
 
 
 @contextmanager
-def weather_table(path: Path | None) -> Iterator[list[Sequence[object]]]:
+def weather_table(path: Path | None, results: Iterable[Path]) -> Iterator[list[Sequence[object]]]:
     """Lends a list of rows, and writes them as a table when the block ends.
+
+    If the block fails, a table of as many rows or more that is there already stays.
 
     Args:
         path: The file; None writes none.
+        results: Files that the block may write.
 
     Raises:
-        InputError: Some other file is there, or the file cannot be written.
+        InputError: Some other file is or will be there, or the file cannot be written.
     """
     rows: list[Sequence[object]] = []
     if path is None:
         yield rows
         return
+    remedy = "Give --weather another file."
+    namesakes = (result for result in results if result.name == path.name)
+    if os.path.realpath(path) in map(os.path.realpath, namesakes):
+        raise InputError(path, "is a file of the results", remedy)
+    before = b""
     if is_file(path):
-        with reading(path), path.open("rb") as file:
-            start = file.read(len(FIRST_COLUMNS))
-        if start not in (FIRST_COLUMNS, b""):
-            reason = "exists, and is not a table of the weather"
-            raise InputError(path, reason, "Give --weather another file.")
+        with reading(path):
+            before = path.read_bytes()
+        if before and not before.startswith(FIRST_COLUMNS):
+            raise InputError(path, "exists, and is not a table of the weather", remedy)
     require_writable(path)
+    is_whole = False
     try:
         yield rows
+        is_whole = True
     finally:  # scans cleaned before an error or the end of a pipe have their lines
-        table = io.StringIO()
-        csv.writer(table, lineterminator="\n").writerows([TABLE_HEAD, *rows])
-        write_text(path, table.getvalue(), newline="")
+        if is_whole or before.count(b"\n") <= len(rows):
+            table = io.StringIO()
+            csv.writer(table, lineterminator="\n").writerows([TABLE_HEAD, *rows])
+            write_text(path, table.getvalue(), newline="")
 
 
 def _dry_reach(

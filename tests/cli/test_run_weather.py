@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from derain.cli.main import BROKEN_PIPE
+from derain.cli.weather_options import weather_table
 from derain.files import read_scan
 from derain.weather.alarm import Alarm, Threshold
 from derain.weather.scan_weather import ScanWeather
@@ -169,6 +170,25 @@ def test_scans_that_are_no_recording_have_levels_and_no_alarm(
     assert [item["level"] for item in found] == by_name
     assert {item["alarm"] for item in found} == {None}
     assert outcome.code == 3  # by the scans alone
+
+
+def test_a_table_takes_the_place_of_no_result(refused, recording, tmp_path) -> None:
+    for name in ("out/000003.bin", "out/000003.label", "rain/000003.bin"):
+        folders = ("--out", tmp_path / "out", "--removed", tmp_path / "rain")
+        line = refused("run", "dror", recording, *folders, "--weather", tmp_path / name)
+        assert f"{tmp_path / name}: " in line
+
+
+def test_a_run_that_fails_leaves_the_longer_table(tmp_path) -> None:
+    table = tmp_path / "weather.csv"
+    for rows, expected in ((3, 3), (2, 3), (4, 4)):
+        with pytest.raises(KeyboardInterrupt), weather_table(table, []) as lines:
+            lines.extend([number] for number in range(rows))
+            raise KeyboardInterrupt
+        assert len(table.read_text().splitlines()) == 1 + expected
+    with weather_table(table, []) as lines:
+        lines.append([0])
+    assert len(table.read_text().splitlines()) == 2
 
 
 def test_a_table_takes_the_place_of_no_other_file(refused, recording, tmp_path) -> None:
