@@ -52,6 +52,7 @@ from derain.sources.cleaning import clean as clean
 from derain.sources.folders import named_frames as named_frames
 from derain.sources.source import Frames as Frames
 from derain.sources.units import Division as Division
+from derain.sources.weather_monitor import WeatherOptions as WeatherOptions
 from derain.system.memory import keep_freed_memory as keep_freed_memory
 from derain.weather.alarm import Alarm as Alarm
 from derain.weather.alarm import Threshold as Threshold

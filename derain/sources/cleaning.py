@@ -36,7 +36,8 @@ class CleanReport:
     Attributes:
         scans: The cleaned scans, in order.
         failures: Why other scans were not cleaned.
-        weather: The weather of all scans together.
+        weather: The weather of all scans that it is measured of: some, unless every one is asked
+            for.
         before: Number of the cleaned scans that an earlier run had cleaned.
         not_cleaned: Number of scans that were not cleaned.
     """
@@ -123,6 +124,9 @@ def clean(
         InputError: No scans, a folder whose files would be overwritten, or a bag that cannot be
             written; records of other options in the folder; an executor that has ended.
     """
+    if isinstance(method, str | Path):
+        remedy = "Give derain.Derainer(...) or derain.FilterDerainer(...)."
+        raise InputError(method, "is the name of a method, and not a method", remedy)
     source = source_of(source, results=[] if isinstance(sink, CleanSink) else [sink])
     monitor = WeatherMonitor(weather, source, knows_recordings=placing is None)
     sample = None if weather.every_scan else monitor.sample

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 from recorded_scenes import write_scenes
 
 import derain
@@ -44,3 +45,9 @@ def test_a_scan_that_cannot_be_read_is_reported_and_the_others_are_cleaned(tmp_p
         rain = read_labels(out / f"{path.stem}.label", scan.points)
         np.testing.assert_array_equal(rain, dror(derain.read_scan(path)))
         assert (scan.rain, len(derain.read_scan(out / path.name))) == (rain.sum(), 200 - rain.sum())
+
+
+def test_a_name_is_no_method(tmp_path) -> None:
+    scans = write_scenes(tmp_path / "scans", 200, name="{}.bin")
+    with pytest.raises(derain.InputError, match="name of a method"):
+        derain.clean(scans, "dror", tmp_path / "out")
