@@ -21,6 +21,12 @@ SAMPLED_SCANS = 5
 class WeatherOptions:
     """Options for measuring the weather of a recording.
 
+    Example:
+        >>> dror, every = derain.FilterDerainer(derain.DROR()), WeatherOptions(every_scan=True)
+        >>> report = derain.clean("scan.bin", dror, "cleaned", weather=every)
+        >>> str(report.weather.total.visibility)
+        '42.9 m [29.5 to 64.7 m]'
+
     Attributes:
         every_scan: True to measure every scan; otherwise SAMPLED_SCANS are, for the weather of
             all scans together.
