@@ -214,7 +214,7 @@ def legend_below(figure: Figure, handles: Sequence[Any], **options: Any) -> None
 
 def input_title(scan: Scan) -> str:
     """Title of the panel that shows the scan before cleaning."""
-    return "input" if scan.intensity is None else "input: intensity"
+    return "input" if scan.measured_intensity is None else "input: intensity"
 
 
 def draw_columns(
@@ -245,7 +245,7 @@ def draw_from_above(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -
         axes: The axes to draw in.
         scan: The scan; invalid points are not drawn.
         outcome: Outcome of each point, as a number of ``OUTCOMES``, int64 (N,); None shows
-            intensity.
+            intensity where it was measured.
     """
     seen = scan.valid
     x, y, _ = scan.xyz[seen].T
@@ -308,9 +308,9 @@ def _colours(
     """Colours, RGBA (K, 4), and the number of each point's colour, by its outcome or intensity."""
     if outcome is not None:
         return to_rgba_array(list(OUTCOMES.values())), outcome[rows]
-    if scan.intensity is None or not rows.any():
+    if scan.measured_intensity is None or not rows.any():
         return to_rgba_array(SOLID), np.zeros(np.count_nonzero(rows), np.int64)
-    intensity = np.maximum(scan.intensity[rows], 0)
+    intensity = np.maximum(scan.measured_intensity[rows], 0)
     brightness = intensity / max(float(np.percentile(intensity, 98)), 1e-6)
     share = np.sqrt(np.clip(brightness, 0, 1))
     shades = np.linspace(0.25, 1, SHADES)  # from dark to bright

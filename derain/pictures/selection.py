@@ -29,7 +29,7 @@ LOOKED_AT = 4
 # From dark to bright; the colours of classes stand out from them.
 GREYS = ("#404040", "#f0f0f0")
 
-# Shade of scans without intensities.
+# Shade of scans without measured intensities.
 EVEN_GREY = 0.35
 
 # Pixels of range images count centimetres, which 16 bits hold up to 655 m.
@@ -155,7 +155,11 @@ class SensorLook:
         for frame in evenly_spaced(frames, LOOKED_AT):
             with suppress(InputError):  # reported when the frame is written
                 scans.append(frame.read())
-        intensities = [s.intensity[s.valid] for s in scans if s.intensity is not None]
+        intensities = [
+            scan.measured_intensity[scan.valid]
+            for scan in scans
+            if scan.measured_intensity is not None
+        ]
         ranges = [scan.range[scan.valid] for scan in scans]
         try:
             view = RangeView(fit_grid(scans).grid, channels=())
@@ -164,11 +168,11 @@ class SensorLook:
         return cls(_nearly_all(intensities), _nearly_all(ranges), view)
 
     def colours(self, scan: Scan) -> NDArray[np.uint8]:
-        """Shades of grey by intensity, uint8 (N, 3)."""
-        if scan.intensity is None:
+        """Shades of grey by intensity, uint8 (N, 3); one shade where none was measured."""
+        if scan.measured_intensity is None:
             return shades(GREYS, np.full(len(scan), EVEN_GREY))
         with np.errstate(invalid="ignore"):
-            brightness = np.nan_to_num(scan.intensity) / self.brightest
+            brightness = np.nan_to_num(scan.measured_intensity) / self.brightest
             return shades(GREYS, np.sqrt(np.clip(brightness, 0, 1)))
 
     def centimetres(self, seen: RangeImage) -> NDArray[np.uint16]:

@@ -1,5 +1,6 @@
 """``derain view RECORDING --rerun``: what the viewer is given is what ``derain run`` finds."""
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -115,6 +116,24 @@ def test_without_labels_there_is_no_truth(succeed, recording, tmp_path) -> None:
     (warning,) = outcome.messages
     assert f"{first}: no scan has labels" in warning
     assert not any("truth" in entity for entity in ReadBack(out).entities)
+
+
+@pytest.mark.parametrize("filled", [np.nan, np.inf])
+def test_scans_whose_intensities_are_no_numbers_have_one_shade(
+    succeed, recording, tmp_path, filled
+) -> None:
+    points = scene(300)
+    points[:, 3] = filled
+    for path in recording.iterdir():
+        points.tofile(path)
+    out = tmp_path / "out.rrd"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        succeed("view", recording, "--methods", "dror", "--rerun", out)
+    colours = ReadBack(out).values("/sensor/scan/points", "Points3D:colors")
+    assert list(colours) == list(range(SCANS))
+    assert all(len(of_scan) == 300 for of_scan in colours.values())
+    assert len({colour for of_scan in colours.values() for colour in of_scan}) == 1
 
 
 def test_some_scans_are_shown_and_a_method_of_several_scans_sees_all(

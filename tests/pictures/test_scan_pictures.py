@@ -109,6 +109,20 @@ def test_without_truth_what_is_removed_is_shown() -> None:
     assert list(panels(figure))[1:] == ["truth: 0 points of rain", "none: IoU -"]
 
 
+@pytest.mark.parametrize("filled", [np.nan, np.inf, -np.inf, 7])
+def test_intensities_that_were_not_measured_are_not_shown(filled) -> None:
+    points, called = scene(200), np.zeros(200, bool)
+    bare = comparison_figure(Scan.of(points[:, :3]), {"none": called}, None, "bare")
+    points[:, 3] = filled
+    filled_in = comparison_figure(Scan.of(points), {"none": called}, None, "filled")
+    shown, expected_panels = panels(filled_in), panels(bare)
+    assert list(shown) == list(expected_panels)
+    for axes, same in zip(shown["input"], expected_panels["input"], strict=True):
+        np.testing.assert_array_equal(places(axes), places(same))
+        (drawn,), (grey,) = axes.collections, same.collections
+        np.testing.assert_array_equal(drawn.get_facecolors(), grey.get_facecolors())
+
+
 def test_no_row_of_panels_is_left_with_one_and_no_title_runs_into_another() -> None:
     names = ["a method with a name so long that nobody would ever type it", "short"]
     called = {f"{names[n % 2]} {n}": np.zeros(50, bool) for n in range(7)}
