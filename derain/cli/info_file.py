@@ -117,6 +117,8 @@ def _of_scan(scan: Scan, frame: Frame, card: DataCard | None) -> dict[str, Any]:
 
 
 def _span(values: NDArray[Any]) -> dict[str, float] | str:
+    """Bounds and median of the finite values: JSON has no NaN and no infinity."""
+    values = values[np.isfinite(values)]
     if not len(values):
         return "none"
     numbers = np.percentile(values, [0, 50, 100]).tolist()

@@ -1,6 +1,7 @@
 """``derain info`` prints what is in a scan, labels, a model and a checkpoint."""
 
 import json
+import warnings
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
@@ -157,6 +158,27 @@ def test_a_scan_without_a_valid_point_has_no_grid(facts_of, refused, tmp_path) -
     assert facts_of(tmp_path / "nothing.bin")["fitted grid"] == "none"
     line = refused("info", "--grid", tmp_path / "nothing.bin")
     assert line.startswith("derain: grid: there is no valid point to fit it to.")
+
+
+@pytest.mark.parametrize(
+    ("filled", "span"),
+    [
+        ([np.nan], "none"),
+        ([np.inf, -np.inf], "none"),
+        # More than any sensor measures, so that no intensity counts; the number is still told.
+        ([np.inf, 3e7], {"min": 3e7, "median": 3e7, "max": 3e7}),
+    ],
+)
+def test_intensities_that_are_no_numbers_are_not_in_the_span(
+    facts_of, tmp_path, filled, span
+) -> None:
+    points = scene(200)
+    points[:, 3] = np.resize(filled, 200)
+    points.tofile(tmp_path / "scan.bin")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        facts = facts_of(tmp_path / "scan.bin")
+    assert (facts["valid"], facts["intensity"]) == (200, span)
 
 
 @pytest.mark.parametrize(
