@@ -1,6 +1,6 @@
 """Named columns: what every scan file holds, and the Scan they make."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -70,18 +70,49 @@ def scan_of(
             one name: see :func:`derain.scan.named`.
     """
     flat = _numbers(fields, 1)
-    found = (named(flat, name, path) for name in INTENSITY_NAMES)
-    intensity = next((column for column in found if column is not None), None)
+    intensity = intensity_name(path, flat)
     radar = named(flat, "radar", path)
     return Scan(
         _coordinates(path, fields),
-        None if intensity is None else to_float32(intensity),
+        None if intensity is None else to_float32(flat[intensity]),
         radar=None if radar is None else radar != 0,
         fields=dict(fields),
         shape=shape,
         name=str(path),
         header=header,
     )
+
+
+def intensity_name(subject: str | Path, names: Iterable[str]) -> str | None:
+    """The column that holds the intensity, the first of INTENSITY_NAMES; None if there is none.
+
+    Args:
+        subject: Name of the file in messages.
+        names: Names of its columns.
+
+    Raises:
+        InputError: Several columns match one name: see :func:`derain.scan.named`.
+    """
+    known = {name: name for name in names}
+    found = (named(known, name, subject) for name in INTENSITY_NAMES)
+    return next((name for name in found if name is not None), None)
+
+
+def names_of_a_scan(path: Path, names: Iterable[str]) -> list[str]:
+    """Those columns of a file that a scan is made of: coordinates, intensity and radar.
+
+    Args:
+        path: The file, for messages.
+        names: Names of its columns.
+
+    Raises:
+        InputError: Several columns match one name: see :func:`derain.scan.named`.
+    """
+    known = {name: name for name in names}
+    table = named(known, "xyz", path)
+    axes = [named(known, axis, path) for axis in "xyz"] if table is None else [table]
+    found = [*axes, intensity_name(path, known), named(known, "radar", path)]
+    return [name for name in found if name is not None]
 
 
 def _numbers(fields: Mapping[str, NDArray[Any]], *axes: int) -> dict[str, NDArray[Any]]:

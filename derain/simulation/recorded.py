@@ -7,8 +7,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from derain.files.columns import INTENSITY_NAMES
-from derain.scan import Scan, named, to_float32
+from derain.files.columns import intensity_name
+from derain.scan import Scan, to_float32
 from derain.simulation.arrays import Bools, Floats, Ints
 from derain.simulation.classes import TrackClass
 from derain.simulation.rain import rain_on_beams
@@ -158,17 +158,14 @@ def with_intensity(scan: Scan, rows: Ints, intensity: Floats) -> Scan:
             numbers.
     """
     assert scan.intensity is not None
-    names = {name: name for name in scan.fields}
-    known = (named(names, name, scan.name) for name in INTENSITY_NAMES)
-    found = [name for name in known if name is not None][:1]
-    fields = {name: _written(scan.fields[name], rows, intensity) for name in found}
-    # The scan's intensity is what its file holds: rounded if that is a column of whole numbers.
-    seen = [column[rows] for column in fields.values()] or [intensity]
-    return replace(
-        scan,
-        intensity=_written(scan.intensity, rows, to_float32(seen[0])),
-        fields={**scan.fields, **fields},
-    )
+    fields = dict(scan.fields)
+    name = intensity_name(scan.name, fields)
+    if name is not None:
+        fields[name] = _written(fields[name], rows, intensity)
+        # The scan's intensity is what its file holds: rounded in a column of whole numbers.
+        intensity = fields[name][rows]
+    seen = _written(scan.intensity, rows, to_float32(intensity))
+    return replace(scan, intensity=seen, fields=fields)
 
 
 def _unit(column: NDArray[Any], scan: Scan) -> float:

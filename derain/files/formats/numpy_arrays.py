@@ -13,7 +13,7 @@ from numpy.lib import format as npy_format
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.files.columns import columns_of, name_columns, records, scan_of
+from derain.files.columns import columns_of, name_columns, names_of_a_scan, records, scan_of
 from derain.files.content import Content, check_columns
 from derain.files.format import FORMATS, Format
 from derain.scan import Scan, named
@@ -38,12 +38,14 @@ class NpzHeader:
         table: Name of the array that holds several columns, if there is one.
         columns: Their names.
         structured: True if they are named fields of that array.
+        upright: Names of the columns that the file holds as arrays (N, 1).
     """
 
     constants: Mapping[str, NDArray[Any]]
     table: str | None = None
     columns: tuple[str, ...] = ()
     structured: bool = False
+    upright: frozenset[str] = frozenset()
 
 
 @FORMATS.add(".npy")
@@ -100,13 +102,14 @@ class Npz(Format):
             content: The file. Coordinates are `xyz` (N, 3) or `x`, `y` and `z` (N,); in an
                 organised cloud `xyz` (H, W, 3) or `x`, `y` and `z` (H, W). Without them, `points`
                 or the only array is a table as in a .npy. Every array that begins with the same
-                (N,) or (H, W) is a column of the scan, flattened row-major. An array (W,) in an
-                organised cloud, such as a spinning sensor's timestamps, is repeated for each of the
-                H rows.
+                (N,) or (H, W) is a column of the scan, flattened row-major; an array (N, 1) is a
+                column (N,). An array (W,) in an organised cloud, such as a spinning sensor's
+                timestamps, is repeated for each of the H rows.
             columns: Names of the columns of such a table, unless it is structured.
 
         Raises:
-            InputError: A file that is damaged, or that has no coordinates.
+            InputError: A file that is damaged or has no coordinates, or an array that is named as
+                coordinates, intensity or radar and has another number of points.
         """
         path, arrays = content.path, _arrays(content)
         table = _name_of_table(path, arrays)
@@ -116,18 +119,23 @@ class Npz(Format):
         if table is not None:
             structured = bool(arrays[table].dtype.names)
             fields = _columns_of_table(path, arrays.pop(table), columns)
-        stated = tuple(fields)
+        stated, upright = tuple(fields), set[str]()
         for name, array in arrays.items():
             if name in stated:
                 raise InputError(path, f"has an array {name} beside a column {name}", "Rename one.")
-            if array.shape[: len(grid)] == grid:
+            if array.shape == (*grid, 1):
+                upright.add(name)
+                fields[name] = array.reshape(-1)
+            elif array.shape[: len(grid)] == grid:
                 fields[name] = array.reshape(math.prod(grid), *array.shape[len(grid) :])
             elif shape and array.shape == shape[1:]:
                 content.budget.reserve(shape[0] * array.nbytes)
                 fields[name] = np.tile(array, shape[0])
             else:
                 constants[name] = array
-        return scan_of(path, fields, shape, NpzHeader(constants, table, stated, structured))
+        _refuse_other_points(path, grid, fields, constants)
+        header = NpzHeader(constants, table, stated, structured, frozenset(upright))
+        return scan_of(path, fields, shape, header)
 
     def encode(self, path: Path, scan: Scan) -> bytes:
         """A scan's columns as named arrays, compressed. Organised clouds stay organised."""
@@ -137,7 +145,9 @@ class Npz(Format):
         if header.table is not None and columns.keys() >= set(header.columns):
             table = {name: columns.pop(name) for name in header.columns}
             arrays[header.table] = _gridded(scan, _table(table, header.structured))
-        arrays |= {name: _gridded(scan, column) for name, column in columns.items()}
+        for name, column in columns.items():
+            upright = name in header.upright and column.ndim == 1
+            arrays[name] = _gridded(scan, column[:, np.newaxis] if upright else column)
         arrays |= header.constants
         file = io.BytesIO()
         # Not numpy.savez, which cannot write an array named "file".
@@ -230,12 +240,30 @@ def _grid(path: Path, arrays: Mapping[str, NDArray[Any]]) -> tuple[int, ...]:
     if table is not None:
         return table.shape[:-1]
     if column is not None:
-        return column.shape
+        return column.shape[:1] if column.shape[1:] == (1,) else column.shape
     raise InputError(
         path,
         f"has no coordinates among its arrays ({', '.join(arrays)})",
         "Name them xyz, or x, y and z.",
     )
+
+
+def _refuse_other_points(
+    path: Path,
+    grid: tuple[int, ...],
+    fields: Mapping[str, NDArray[Any]],
+    constants: Mapping[str, NDArray[Any]],
+) -> None:
+    """Refuses a constant that has the name of a column that is read.
+
+    A single value, such as the number of a frame under the name i, is no column of anything.
+    """
+    arrays = [name for name, array in constants.items() if array.ndim]
+    for name in names_of_a_scan(path, [*fields, *arrays]):
+        if name in arrays:
+            shape = constants[name].shape
+            reason = f"the array {name} has shape {shape}, but the points have {grid}"
+            raise InputError(path, reason, f"Give {name} one value per point, or another name.")
 
 
 def _organised(path: Path, grid: tuple[int, ...]) -> tuple[int, int] | None:

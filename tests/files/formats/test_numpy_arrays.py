@@ -142,6 +142,82 @@ def test_points_may_have_further_arrays_beside_them(tmp_path) -> None:
         read_scan(tmp_path / "scan.npz")
 
 
+XYZ = np.arange(18, dtype=np.float32).reshape(6, 3)
+GRID = {"xyz": XYZ.reshape(2, 3, 3)}
+
+
+@pytest.mark.parametrize(
+    ("points", "name", "shape"),
+    [
+        *(({"xyz": XYZ}, name, (5,)) for name in ("intensity", "Remission", "i", "radar")),
+        *(({"xyz": XYZ}, "intensity", shape) for shape in ((7,), (0,), (1,), (5, 1), (1, 6))),
+        *((GRID, "intensity", shape) for shape in ((6,), (3, 2), (2, 4), (2,))),
+        ({"points": XYZ}, "intensity", (5,)),
+        ({"x": XYZ[:, 0], "y": XYZ[:, 1]}, "z", (5,)),
+    ],
+)
+def test_an_array_by_the_name_of_a_column_is_of_as_many_points(
+    tmp_path, points, name, shape
+) -> None:
+    np.savez(path := tmp_path / "scan.npz", **points, **{name: np.ones(shape, np.float32)})
+    with pytest.raises(InputError) as refused:
+        read_scan(path, ("x", "y", "z"))
+    assert refused.value.subject == path
+    assert name in refused.value.reason
+    assert str(shape) in refused.value.reason
+
+
+def test_what_is_not_read_by_its_name_may_be_of_any_length(tmp_path) -> None:
+    others = {"signal": np.arange(9), "x": np.arange(4), "i": np.array(17), "beams": np.ones(2)}
+    strength = np.arange(6, dtype=np.uint8)
+    np.savez(tmp_path / "scan.npz", xyz=XYZ, intensity=strength, **others)
+    scan = read_scan(tmp_path / "scan.npz")
+    assert list(scan.fields) == ["xyz", "intensity"]
+    write_scan(tmp_path / "clean.npz", scan.take(strength > 2))
+    with np.load(tmp_path / "clean.npz") as clean:
+        for name, array in others.items():
+            np.testing.assert_array_equal(clean[name], array, strict=True)
+    np.savez(tmp_path / "scan.npz", xyz=XYZ, i=others["i"], reflectivity=strength)
+    np.testing.assert_array_equal(read_scan(tmp_path / "scan.npz").intensity, strength)
+
+
+@pytest.mark.parametrize(
+    ("coordinates", "grid"),
+    [
+        ({"xyz": XYZ}, (6,)),
+        ({axis: XYZ[:, place, None] for place, axis in enumerate("xyz")}, (6,)),
+        ({"x": XYZ[:, :1], "y": XYZ[:, 1], "z": XYZ[:, 2:]}, (6,)),
+        (GRID, (2, 3)),
+        ({"points": XYZ}, (6,)),
+    ],
+)
+def test_a_column_that_stands_upright_is_read_and_written_as_it_was(
+    tmp_path, coordinates, grid
+) -> None:
+    strength, radar = np.arange(6, dtype=np.uint8), np.arange(6) % 2
+    further = {"intensity": strength.reshape(*grid, 1), "radar": radar.reshape(grid)}
+    arrays, path = {**coordinates, **further}, tmp_path / "scan.npz"
+    np.savez(path, **arrays)
+    scan = read_scan(path, ("x", "y", "z"))
+    assert scan.shape == (grid if len(grid) == 2 else None)
+    np.testing.assert_array_equal(scan.xyz, XYZ)
+    np.testing.assert_array_equal(scan.intensity, strength)
+    np.testing.assert_array_equal(scan.radar, radar == 1)
+    write_scan(path, scan)
+    with np.load(path) as copy:
+        assert sorted(copy) == sorted(arrays)
+        for name, array in arrays.items():
+            np.testing.assert_array_equal(copy[name], array, strict=True)
+    stay = strength > 2
+    write_scan(path, scan.take(stay))
+    with np.load(path) as clean:
+        for name, array in arrays.items():
+            flat = array.reshape(6, *array.shape[len(grid) :])
+            np.testing.assert_array_equal(clean[name], flat[stay], strict=True)
+    write_scan(tmp_path / "scan.csv", scan)
+    np.testing.assert_array_equal(read_scan(tmp_path / "scan.csv").intensity, strength)
+
+
 @pytest.mark.parametrize("suffix", [".npy", ".npz", ".bin", ".pcd", ".ply"])
 @pytest.mark.parametrize("names", [("x", "y", "z"), ("x", "y", "z", "intensity")])
 @pytest.mark.parametrize("from_file", [False, True])
