@@ -132,12 +132,35 @@ def _coordinates(path: Path, fields: Mapping[str, NDArray[Any]]) -> NDArray[np.f
     flat = _numbers(fields, 1)
     axes = [column for axis in "xyz" if (column := named(flat, axis, path)) is not None]
     if len(axes) < 3:
+        _refuse_unusable(path, fields)
         raise InputError(
             path,
             f"has no x, y and z among its columns ({', '.join(fields)})",
             "Name the coordinates x, y and z; --columns names the columns of a file without names.",
         )
     return np.stack([to_float32(axis) for axis in axes], axis=1)
+
+
+def _refuse_unusable(path: Path, fields: Mapping[str, NDArray[Any]]) -> None:
+    """Refuses coordinates that are there by their names, but not as numbers of each point."""
+    usable = _numbers(fields, 1)
+    columns = {name: named(fields, name, path) for name in ("xyz", *"xyz")}
+    unusable = [
+        f"{name} is {_kind(column)}"
+        for name, column in columns.items()
+        if column is not None and named(usable, name, path) is None
+    ]
+    if unusable:
+        raise InputError(
+            path,
+            f"its coordinates are not one number per point: {', '.join(unusable)}",
+            "Give x, y and z as whole or real numbers, one of each per point.",
+        )
+
+
+def _kind(column: NDArray[Any]) -> str:
+    """Type of a column's values, and their shape at each point."""
+    return f"{column.dtype}{f' of shape {column.shape[1:]}' if column.ndim > 1 else ''}"
 
 
 def columns_of(scan: Scan) -> dict[str, NDArray[Any]]:
@@ -202,8 +225,7 @@ def no_place(
     path: Path, name: str, column: NDArray[Any], remedy: str = "Write .npz."
 ) -> InputError:
     """The error of a column that a format cannot hold."""
-    shape = f" of shape {column.shape[1:]}" if column.ndim > 1 else ""
-    reason = f"{scan_suffix(path)} has no place for the column '{name}' ({column.dtype}{shape})"
+    reason = f"{scan_suffix(path)} has no place for the column '{name}' ({_kind(column)})"
     return InputError(path, reason, remedy)
 
 

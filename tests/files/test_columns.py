@@ -68,6 +68,26 @@ def test_a_file_without_coordinates_is_refused(tmp_path, suffix) -> None:
         read_scan(path)
 
 
+@pytest.mark.parametrize(
+    ("columns", "told"),
+    [
+        ({axis: np.zeros(5, np.complex64) for axis in "xyz"}, ["x is complex64", "z is complex64"]),
+        ({"x": np.zeros(5), "y": np.zeros(5), "Z": np.zeros(5, bool)}, ["z is bool"]),
+        ({"x": np.zeros(5), "y": np.zeros(5), "z": np.zeros((5, 3))}, ["float64", "(3,)"]),
+        ({"xyz": np.zeros((5, 3), "U1")}, ["xyz", "U1"]),
+        ({"points": np.zeros((5, 3), "U1")}, ["x is <U1", "y is <U1", "z is <U1"]),
+    ],
+)
+def test_coordinates_that_are_no_numbers_are_named_with_what_they_are(
+    tmp_path, columns, told
+) -> None:
+    np.savez(tmp_path / "scan.npz", **columns)
+    with pytest.raises(InputError) as refused:
+        read_scan(tmp_path / "scan.npz", ("x", "y", "z"))
+    assert all(part in refused.value.reason for part in told)
+    assert "has no x, y and z" not in refused.value.reason
+
+
 def written(path: Path, names: tuple[str, ...]) -> Path:
     """A file of ten points, whose first holds the place of each column, from 1."""
     rows = np.arange(1, len(names) + 1, dtype=np.float32) + np.arange(10, dtype=np.float32)[:, None]
