@@ -158,7 +158,7 @@ class Scan:
             reason = f"points cannot be converted to an array ({reason_of(error)})"
             raise InputError(name, reason, remedy) from error
         width = array.shape[1] if array.ndim == 2 else 0
-        if width < 3 or width > max(len(array), WIDEST_ARRAY):
+        if width < 3 or has_points_as_columns(len(array), width):
             raise InputError(name, f"points have shape {array.shape}", remedy)
         return cls(array[:, :3], array[:, 3] if width > 3 else None, name=name)
 
@@ -332,6 +332,11 @@ def named(columns: Mapping[str, Named], name: str, subject: str | Path) -> Named
             f"Rename the one that is meant to {name}.",
         )
     return columns[alike[0]] if alike else None
+
+
+def has_points_as_columns(rows: int, width: int) -> bool:
+    """True if an array is so much wider than long that its points must be its columns."""
+    return width > max(rows, WIDEST_ARRAY)
 
 
 def to_float32(array: NDArray[Any]) -> NDArray[np.float32]:

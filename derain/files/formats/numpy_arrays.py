@@ -16,7 +16,7 @@ from derain.errors import InputError
 from derain.files.columns import columns_of, name_columns, names_of_a_scan, records, scan_of
 from derain.files.content import Content, check_columns
 from derain.files.format import FORMATS, Format
-from derain.scan import Scan, named
+from derain.scan import Scan, has_points_as_columns, named
 
 # What stands before each member in the directory of a ZIP file.
 _MEMBER = b"PK\x01\x02"
@@ -213,12 +213,20 @@ def _table(columns: Mapping[str, NDArray[Any]], structured: bool) -> NDArray[Any
 def _columns_of_table(
     path: Path, array: NDArray[Any], columns: Sequence[str]
 ) -> dict[str, NDArray[Any]]:
-    """The columns of an array of numbers or a structured one, each (N,)."""
+    """The columns of an array of numbers or a structured one, each (N,).
+
+    Raises:
+        InputError: Another number of columns than names, or points that lie side by side.
+        ValueError: More columns than a scan has.
+    """
     if names := array.dtype.names:
         flat = array.reshape(-1)
         return {name: flat[name] for name in names}
-    check_columns(array.shape[-1])  # before an array is made of each
     points = math.prod(array.shape[:-1])
+    if has_points_as_columns(points, array.shape[-1]):
+        remedy = "Write the array with a row for each point, such as its transpose."
+        raise InputError(path, f"its array has shape {array.shape}", remedy)
+    check_columns(array.shape[-1])  # before an array is made of each
     return name_columns(path, list(array.reshape(points, array.shape[-1]).T), columns)
 
 

@@ -106,6 +106,17 @@ def test_arrays_that_are_no_points_are_refused(tmp_path, arrays) -> None:
         read_scan(path)
 
 
+@pytest.mark.parametrize("name", ["", "points"])
+@pytest.mark.parametrize("shape", [(4, 100), (4, 30_000), (3, 100_000)])
+def test_points_that_are_columns_are_refused_by_their_shape(tmp_path, name, shape) -> None:
+    points = np.zeros(shape, np.float32)
+    path = tmp_path / ("scan.npz" if name else "scan.npy")
+    np.savez(path, **{name: points}) if name else np.save(path, points)
+    with pytest.raises(InputError, match="a row for each point") as refused:
+        read_scan(path)
+    assert str(shape) in refused.value.reason
+
+
 @pytest.mark.parametrize("name", ["", "points", "Points", "arr_0", "cloud"])
 @pytest.mark.parametrize("shape", [(6, 4), (2, 3, 4), (0, 4)])
 def test_a_table_alone_is_read_and_comes_back_with_its_grid(tmp_path, name, shape) -> None:
