@@ -20,6 +20,9 @@ COMPRESSED_SUFFIXES = (".mcap.zstd", ".db3.zstd")
 # Suffix of a bag of ROS 1 that is being recorded.
 UNFINISHED_SUFFIX = ".bag.active"
 
+# What SQLite adds to the name of a database for the log of changes that are not in it yet.
+LOG_SUFFIXES = ("-wal", "-journal")
+
 # The file that makes a folder a bag of ROS 2, and the word that it contains.
 BAG_METADATA, METADATA_WORD = "metadata.yaml", b"rosbag2_bagfile_information"
 
@@ -70,8 +73,14 @@ def is_bag(path: Path) -> bool:
 
 
 def files_of(bag: Path) -> list[Path]:
-    """The files of a bag: itself, or those in its folder, sorted."""
-    return sorted(filter(Path.is_file, bag.iterdir())) if bag.is_dir() else [bag]
+    """The files of a bag: itself and its logs, or those in its folder, sorted."""
+    return sorted(filter(Path.is_file, bag.iterdir())) if bag.is_dir() else [bag, *logs_of(bag)]
+
+
+def logs_of(database: Path) -> list[Path]:
+    """The logs beside a database, with changes that SQLite has not written into it yet."""
+    logs = (database.with_name(database.name + suffix) for suffix in LOG_SUFFIXES)
+    return [log for log in logs if log.is_file()]
 
 
 def split(path: Path) -> tuple[Path, str] | None:

@@ -10,7 +10,9 @@ from pathlib import Path
 from struct import Struct
 from typing import Any, BinaryIO
 
+from derain.bags.names import logs_of
 from derain.bags.unpacking import MOST_UNPACKED, unpack
+from derain.errors import InputError
 from derain.system.extras import APSW, ROSBAGS
 
 # The most topics of a bag, where each publisher of ROS 1 counts as one. The library's time grows
@@ -36,6 +38,9 @@ def rosbags_reader(path: Path, is_ros1: bool) -> Iterator[Any]:
     Args:
         path: A file of ROS 1 or of SQLite, or a folder of ROS 2 with files of SQLite.
         is_ros1: True if it is a file of ROS 1.
+
+    Raises:
+        InputError: A database with messages that are still in a log beside it.
     """
     if is_ros1:
         reader = ROSBAGS.load(path, "rosbag1").Reader(path)
@@ -48,7 +53,7 @@ def rosbags_reader(path: Path, is_ros1: bool) -> Iterator[Any]:
             yield reader
         return
     reader = ROSBAGS.load(path, "rosbag2").Reader(path)
-    with _bounded_databases(path):
+    with _checked_databases(path):
         reader.open()
     try:
         reader.storage.metadata = reader.storage.metadata._replace(compression_mode=None)
@@ -164,11 +169,15 @@ def _bounded(chunk: Any, messages: int) -> Any:
 
 
 @contextmanager
-def _bounded_databases(path: Path) -> Iterator[None]:
-    """Bounds the databases that are opened in the block: the size of a value, and the topics."""
+def _checked_databases(path: Path) -> Iterator[None]:
+    """Bounds the databases that are opened in the block: the size of a value, and the topics.
+
+    It refuses one with a log, which the library would not read.
+    """
     apsw = APSW.load(path)
 
-    def bound(database: Any) -> None:
+    def check(database: Any) -> None:
+        _refuse_log(path, Path(database.filename))
         database.limit(apsw.SQLITE_LIMIT_LENGTH, MOST_UNPACKED)
         listed = "SELECT name FROM sqlite_schema WHERE name IN ('topics', 'message_definitions')"
         for (table,) in database.execute(listed).fetchall():
@@ -176,8 +185,19 @@ def _bounded_databases(path: Path) -> Iterator[None]:
             if database.execute(rows).get > MOST_TOPICS:
                 raise ValueError(f"it has more than {MOST_TOPICS:,} topics")
 
-    apsw.connection_hooks.append(bound)
+    apsw.connection_hooks.append(check)
     try:
         yield
     finally:
-        apsw.connection_hooks.remove(bound)
+        apsw.connection_hooks.remove(check)
+
+
+def _refuse_log(bag: Path, database: Path) -> None:
+    for log in logs_of(database):
+        if log.stat().st_size:
+            raise InputError(
+                bag,
+                f"{log.name} holds changes that are not in {database.name} yet",
+                "End the recording. After a crash, have SQLite join copies of the two files: "
+                f"sqlite3 {database.name} 'PRAGMA wal_checkpoint(TRUNCATE)'.",
+            )

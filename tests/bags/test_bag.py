@@ -1,7 +1,9 @@
 """Bags that cannot be used, each with the reason: one InputError, whatever is wrong."""
 
 import os
+import sqlite3
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +73,26 @@ def test_an_encrypted_bag_is_refused(tmp_path) -> None:
     database = small_bag(tmp_path, "sqlite3")
     storage_file(database).write_bytes(np.random.default_rng(0).bytes(2**14))
     assert "not a database" in refusal(lambda: named_frames([database]))
+
+
+@pytest.mark.parametrize("mode", ["wal", "delete"])
+@pytest.mark.parametrize("alone", [True, False])
+def test_a_database_that_is_being_written_is_refused_until_its_log_is_in_it(
+    tmp_path, mode, alone
+) -> None:
+    bag = small_bag(tmp_path, "sqlite3")
+    named = storage_file(bag) if alone else bag
+    with closing(sqlite3.connect(storage_file(bag), isolation_level=None)) as database:
+        database.execute(f"PRAGMA journal_mode = {mode}")
+        assert read_all(named) == 3  # a log of nothing hides nothing
+        database.execute("BEGIN")
+        database.execute("UPDATE messages SET timestamp = timestamp")
+        if mode == "wal":
+            database.execute("COMMIT")
+        message = refusal(lambda: read_all(named))
+        assert f"{'-wal' if mode == 'wal' else '-journal'} holds" in message
+        assert "wal_checkpoint" in message
+    assert read_all(named) == 3
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from pathlib import Path
 import fsspec
 import numpy as np
 import pytest
-from small_bags import small_bag
+from small_bags import small_bag, storage_file
 
 import derain
 from derain.errors import InputError
@@ -82,6 +82,14 @@ def test_a_bag_is_one_frame_with_all_of_its_files(tmp_path) -> None:
     assert isinstance(bag, StoredBag)
     assert (bag.key, bag.inner) == ("drive", "velodyne_points")
     assert sorted(each.path.name for each in bag.objects) == ["drive.mcap", "metadata.yaml"]
+
+
+def test_a_log_beside_a_database_is_one_of_the_bags_files(tmp_path) -> None:
+    storage_file(small_bag(tmp_path, "sqlite3")).replace(tmp_path / "drive/drive.db3")
+    (tmp_path / "drive/metadata.yaml").unlink()
+    (tmp_path / "drive/drive.db3-wal").write_bytes(b"messages")
+    (bag,) = frames_at([stored(tmp_path / "drive")])
+    assert [each.path.name for each in bag.objects] == ["drive.db3", "drive.db3-wal"]
 
 
 def test_paths_and_urls_are_not_mixed(drives) -> None:
