@@ -205,6 +205,12 @@ class Bag:
             self.path, reason, "Rebuild its index by `ros2 bag reindex` or `rosbag reindex`."
         )
 
+    def too_few_clouds(self, topic: Topic) -> InputError:
+        """The error of a bag with fewer messages of a topic than its index has."""
+        return self.wrong_index(
+            f"has fewer messages of {topic.name} than the {topic.messages:,} of its index"
+        )
+
     def _reader(self, path: Path, metadata: Ros2Metadata | None) -> Any:
         if self.storage != "mcap":
             return rosbags_reader(path, self.is_ros1)

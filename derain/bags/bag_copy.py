@@ -63,9 +63,7 @@ class BagCopy:
                 if self._clouds > number:
                     return message
             self.write(message)
-        raise self.bag.wrong_index(
-            f"has {self._clouds:,} messages of {self.topic.name}, fewer than its index has"
-        )
+        raise self.bag.too_few_clouds(self.topic)
 
     def write(self, message: Message, data: bytes | None = None, topic: str | None = None) -> None:
         """Writes a message, or another one at its time.
@@ -89,12 +87,14 @@ class BagCopy:
             The path of the copy.
 
         Raises:
-            InputError: The bag cannot be read on, has more clouds than its index names, or the copy
-                cannot be written.
+            InputError: The bag cannot be read on, has more or fewer clouds than its index names, or
+                the copy cannot be written.
         """
         for message in self._messages:
             self._clouds += self.topic.has(message.connection)
             self.write(message)
+        if self._clouds < self.topic.messages:
+            raise self.bag.too_few_clouds(self.topic)
         if self._clouds > self.topic.messages:
             raise self.bag.wrong_index(
                 f"has {self._clouds:,} messages of {self.topic.name}, more than its index has, "

@@ -106,7 +106,7 @@ class CloudTopic:
         ahead, self._next = number - self._next, None  # until it went well
         message = next(islice(self._messages, ahead, None), None)
         if message is None:
-            raise self._too_few()
+            raise self.bag.too_few_clouds(self.topic)
         self._next = number + 1
         return message
 
@@ -143,13 +143,8 @@ class CloudTopic:
     def _row(self, number: int) -> int:
         """The row of a cloud in the times of all; the index may name more than there are."""
         if number >= len(self._times_of_all()):
-            raise self._too_few()
+            raise self.bag.too_few_clouds(self.topic)
         return number
-
-    def _too_few(self) -> InputError:
-        return self.bag.wrong_index(
-            f"has fewer messages of {self.topic.name} than the {len(self):,} of its index"
-        )
 
     def _warn_of_other_fields(self, number: int, fields: tuple[PointField, ...]) -> None:
         if self._layouts and fields not in self._layouts:

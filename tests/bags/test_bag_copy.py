@@ -58,9 +58,17 @@ def topic_of(topics: list[dict[str, Any]], name: str) -> dict[str, Any]:
             ),
             "more than its index has",
         ),
+        (
+            lambda bag: change_topics(
+                bag, lambda each: topic_of(each, POINTS).update(message_count=4)
+            ),
+            "than the 4 of its index",
+        ),
     ],
 )
-def test_messages_that_a_database_does_not_index_are_not_dropped(tmp_path, change, reason) -> None:
+def test_a_database_with_other_messages_than_its_index_is_not_copied(
+    tmp_path, change, reason
+) -> None:
     bag = small_bag(tmp_path, "sqlite3")
     change(bag)
     with pytest.raises(InputError, match=reason):
