@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.bags.bag import Bag, Message
-from derain.bags.cloud_message import CloudMessage, stamp_of
+from derain.bags.cloud_message import CDR, ROS1, CloudMessage, stamp_of
 from derain.bags.point_cloud import PointField
 from derain.bags.topics import Topic
 from derain.errors import InputError
@@ -31,9 +31,18 @@ class CloudTopic:
     Args:
         bag: The bag.
         topic: The topic, one of point clouds.
+
+    Raises:
+        InputError: Its messages have an encoding that ROS does not record.
     """
 
     def __init__(self, bag: Bag, topic: Topic) -> None:
+        if topic.encoding not in (ROS1, CDR):
+            raise InputError(
+                bag.path,
+                f"{topic.name} is encoded as '{topic.encoding}', not as {CDR} or {ROS1}",
+                "Record the topic with ROS, or name another one with --topic.",
+            )
         self.bag = bag
         self.topic = topic
         self._forget()

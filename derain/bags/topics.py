@@ -41,7 +41,7 @@ class Topic:
         name: Its name.
         type: Type of its messages.
         messages: Their number, by the bag's index.
-        encoding: Name of the encoding: ``ros1`` or ``cdr``.
+        encoding: Name of the encoding: ``ros1``, ``cdr``, or in MCAP any other.
     """
 
     name: str

@@ -12,7 +12,7 @@ from derain.bags.bag import Bag
 from derain.bags.cloud_topic import CloudTopic
 from derain.bags.names import is_bag, split
 from derain.bags.point_cloud import DATATYPES
-from derain.bags.topics import POINT_CLOUD, decoder_of
+from derain.bags.topics import POINT_CLOUD, Topic, decoder_of
 from derain.cards.card import DataCard, load_card
 from derain.cards.known import layouts_for
 from derain.errors import InputError
@@ -163,7 +163,7 @@ def _of_bag(path: Path) -> dict[str, Any]:
         needs = "" if decoder is None else f"; {decoder} turns it into point clouds"
         topics[topic.name] = f"{topic.type or 'no type'}, {topic.messages:,} messages{needs}"
         if topic.type == POINT_CLOUD and topic.messages:
-            clouds[topic.name] = _of_clouds(CloudTopic(bag, topic))
+            clouds[topic.name] = _of_clouds(bag, topic)
     return {
         "bag": bag.storage,
         "messages": messages,
@@ -174,10 +174,10 @@ def _of_bag(path: Path) -> dict[str, Any]:
     }
 
 
-def _of_clouds(clouds: CloudTopic) -> dict[str, Any]:
+def _of_clouds(bag: Bag, topic: Topic) -> dict[str, Any]:
     """The layout of the first cloud of a topic, which mostly represents all."""
     try:
-        cloud = clouds.cloud(0).cloud
+        cloud = CloudTopic(bag, topic).cloud(0).cloud
     except InputError as error:
         return {"first": str(error)}
     fields = {}

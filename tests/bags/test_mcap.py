@@ -47,10 +47,12 @@ def record(
     ros: Ros,
     backwards: bool = False,
     extra: Callable[[Writer], None] | None = None,
+    encoding: str | None = None,
     **options: Any,
 ) -> Path:
     """A file by the library of MCAP's makers."""
-    profile, encoding = ("ros1", "ros1") if ros.is_ros1 else ("ros2", "cdr")
+    profile, usual = ("ros1", "ros1") if ros.is_ros1 else ("ros2", "cdr")
+    encoding = encoding or usual
     with path.open("wb") as file:
         writer = Writer(file, chunk_size=5000, **options)
         writer.start(profile)
@@ -115,6 +117,16 @@ def test_ros_1_in_mcap_is_read_and_written(tmp_path, run_derain) -> None:
         np.testing.assert_array_equal(frame.read().xyz[:, 0], table["x"])
     with (tmp_path / "out/drive/drive.mcap").open("rb") as new:
         assert make_reader(new).get_header().profile == "ros1"
+
+
+def test_clouds_in_another_encoding_are_refused_by_name(tmp_path, run_derain) -> None:
+    bag = record(tmp_path / "drive.mcap", Ros("mcap"), encoding="json")
+    outcome = run_derain("run", "ror", bag, "--out", tmp_path / "out")
+    assert (outcome.code, outcome.err.count("\n")) == (2, 1)
+    info = run_derain("info", bag)
+    assert info.code == 0  # the bag has other topics
+    for printed in (outcome.err, info.out):
+        assert f"{bag}: {POINTS} is encoded as 'json'" in printed
 
 
 def test_chunks_of_one_time_that_are_too_many_are_refused(tmp_path, monkeypatch) -> None:
