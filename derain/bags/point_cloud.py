@@ -251,11 +251,13 @@ def scan_of_cloud(name: Path, cloud: PointCloud) -> Scan:
         The scan, every field of the cloud as a column.
 
     Raises:
-        InputError: No x, y and z, or several columns that could be one of them.
+        InputError: Points without x, y and z, or several columns that could be one of them.
         ValueError: Coordinates that are not floating-point numbers of one value each, and so in no
             known unit.
     """
     columns = cloud.columns()
+    if not len(cloud):  # then a node may have set no fields
+        columns = dict.fromkeys((*AXES, "intensity"), np.empty(0, np.float32)) | columns
     for axis in AXES:
         column = named(columns, axis, name)
         if column is not None and (column.ndim > 1 or column.dtype.kind != "f"):

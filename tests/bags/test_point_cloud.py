@@ -1,5 +1,6 @@
 """Clouds of any fields: what is kept, what goes, and what is refused."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from derain.bags.point_cloud import DATATYPES, PointCloud, PointField
+from derain.bags.point_cloud import DATATYPES, PointCloud, PointField, scan_of_cloud
 
 
 def cloud_of_columns(columns: dict[str, NDArray[Any]], big: bool = False) -> PointCloud:
@@ -91,6 +92,16 @@ X = (PointField("x", 0, 7, 1),)
 def test_no_count_means_one_value_and_one_row_needs_no_step() -> None:
     cloud = PointCloud(1, 1, (PointField("x", 0, 7, 0),), False, 4, 0, b"\0\0\x80?", True)
     assert cloud.columns()["x"].tolist() == [1.0]
+
+
+@pytest.mark.parametrize("fields", [(), X])
+@pytest.mark.parametrize("height", [0, 1])
+def test_no_points_are_an_empty_scan_whatever_the_fields(fields, height) -> None:
+    cloud = PointCloud(height, 0, fields, False, 4 * len(fields), 0, b"", False)
+    scan = scan_of_cloud(Path("cloud"), cloud)
+    assert scan.xyz.shape == (0, 3)
+    assert list(scan.intensity) == []
+    assert cloud.take(np.zeros(0, bool)) is cloud
 
 
 @pytest.mark.parametrize(

@@ -138,6 +138,17 @@ def test_by_default_it_runs_the_packaged_model_and_publishes_no_rain(ros2_node) 
     assert set(node.subscriptions) == {"points"}
 
 
+def test_a_cloud_of_no_points_goes_out_as_it_came_in(ros2_node) -> None:
+    node = started(ros2_node)
+    nothing = message_of(scene(200)[:0])
+    nothing.fields = []  # as of a message that nobody filled
+    nothing.point_step = 0
+    node.subscriptions["points"][1](nothing)
+    (published,) = node.publishers["points/clean"][1]
+    assert vars(ros2_node.cloud_of(published)) == vars(ros2_node.cloud_of(nothing))
+    assert node.logger == []
+
+
 def test_a_cloud_that_cannot_be_read_is_logged_and_the_next_one_is_cleaned(ros2_node) -> None:
     node = started(ros2_node)
     _, call, _ = node.subscriptions["points"]
