@@ -1,6 +1,6 @@
 """Scans without their rain: files in a folder, and rewritten bags."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -11,6 +11,7 @@ from derain.files.atomic import require_writable_folder
 from derain.files.columns import with_column
 from derain.files.format import format_of
 from derain.scan import Scan
+from derain.sources.bag_frame import BagFrame
 from derain.sources.cleaned_bags import RAIN_PROBABILITY, BagOptions, CleanedBags
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
@@ -124,6 +125,22 @@ class CleanSink:
         removed = None if self._files.removed is None else scan.take(rain)
         self._files.write(frame, scan.take(~rain), rain, removed)
         self._written += 1
+
+    def finish_bags(self, given: Sequence[Frame]) -> Iterator[tuple[Frame, InputError]]:
+        """Puts the last bag in its place, unless clouds of it may follow.
+
+        Args:
+            given: The scans that were given to it.
+
+        Yields:
+            Every cloud of the bags that could not be written, and why.
+        """
+        if len(given) < len(self._source):
+            return
+        broken = self._bags.finish()
+        for frame in self._source:
+            if isinstance(frame, BagFrame) and frame.clouds in broken:
+                yield frame, broken[frame.clouds]
 
     def count(self) -> None:
         """Counts a scan that is written for it, by a sink of its :attr:`destination`."""

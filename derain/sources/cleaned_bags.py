@@ -111,8 +111,18 @@ class CleanedBags:
                 self._stack.close()
             raise
 
-    def end(self, failed: bool) -> None:
+    def finish(self) -> dict[CloudTopic, InputError]:
         """Ends the last copy, and moves it into place.
+
+        Returns:
+            The bags whose copies could not be written, and why.
+        """
+        self._finish()
+        broken, self._broken = self._broken, {}
+        return broken
+
+    def end(self, failed: bool) -> None:
+        """Ends the last copy, unless :meth:`finish` has done so.
 
         Args:
             failed: True if not all clouds were written: the last copy is removed.
@@ -123,9 +133,9 @@ class CleanedBags:
         with self._stack:
             if failed:
                 return
-            self._finish()
-        if self._broken:
-            raise next(iter(self._broken.values()))
+            broken = self.finish()
+        if broken:
+            raise next(iter(broken.values()))
 
     def _write(self, copy: BagCopy, frame: BagFrame, judgement: Judgement) -> None:
         recorded = copy.forward_to(frame.cloud_number)

@@ -1,6 +1,6 @@
 """Cleans the scans of a source, and reports the results."""
 
-from collections import Counter
+from collections import defaultdict
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -35,7 +35,7 @@ class CleanReport:
 
     Attributes:
         scans: The cleaned scans, in order.
-        failures: Why other scans were not cleaned.
+        failures: Why other scans were not cleaned; the reason of a whole bag once.
         weather: The weather of all scans that it is measured of: some, unless every one is asked
             for.
         before: Number of the cleaned scans that an earlier run had cleaned.
@@ -70,13 +70,13 @@ class CleaningObserver:
         """Called for each judged scan with warnings about it."""
 
     def cleaned(self, outcome: ScanOutcome) -> None:
-        """Called for each scan that is written."""
+        """Called for each scan that is written; a bag may still fail at a later one."""
 
     def found(self, outcome: ScanOutcome) -> None:
         """Called for each scan that an earlier run has written."""
 
     def failed(self, error: InputError) -> None:
-        """Called for each scan that could not be cleaned."""
+        """Called for each scan that could not be cleaned, and once for a whole bag."""
 
 
 def clean(
@@ -93,7 +93,7 @@ def clean(
 ) -> CleanReport:
     """Writes scans without their rain, and their labels (1 = rain).
 
-    A scan that cannot be read, judged or written does not stop the others.
+    A scan or a bag that cannot be read, judged or written does not stop the others.
 
     Example:
         >>> report = derain.clean("scan.bin", derain.FilterDerainer(derain.DROR()), "cleaned")
@@ -121,8 +121,8 @@ def clean(
         The results of each scan, and of all together.
 
     Raises:
-        InputError: No scans, a folder whose files would be overwritten, or a bag that cannot be
-            written; records of other options in the folder; an executor that has ended.
+        InputError: No scans, or a folder whose files would be overwritten; records of other options
+            in the folder; an executor that has ended.
     """
     if isinstance(method, str | Path):
         remedy = "Give derain.Derainer(...) or derain.FilterDerainer(...)."
@@ -130,8 +130,8 @@ def clean(
     source = source_of(source, results=[] if isinstance(sink, CleanSink) else [sink])
     monitor = WeatherMonitor(weather, source, knows_recordings=placing is None)
     sample = None if weather.every_scan else monitor.sample
-    cleaned: list[CleanedScan] = []
-    failures: list[InputError] = []
+    cleaned: dict[str, CleanedScan] = {}  # by key
+    failures: dict[str, InputError] = {}  # by text: that of a bag is the same for all its clouds
     before = 0
     with nullcontext(sink) if isinstance(sink, CleanSink) else CleanSink(sink, source) as opened:
         finds_recordings = placing is not None and weather.every_scan
@@ -157,14 +157,17 @@ def clean(
             outcomes = (UnitResult(units[0], outcome, before=False) for outcome in cleaning)
             in_units = False
         scans = sum(len(unit.frames) for unit in units)
-        found = Counter[str]()
+        found: dict[str, set[str]] = defaultdict(set)
         for result in tqdm(outcomes, total=scans, unit="scan", disable=None):
             outcome = result.result
-            found[result.unit.id] += 1
+            key = outcome.frame.key
+            found[result.unit.id].add(key)
             observer.noticed(outcome.frame.name, outcome.issues)
             if outcome.error is not None:
-                failures.append(outcome.error)
-                observer.failed(outcome.error)
+                cleaned.pop(key, None)  # of a bag that failed at a later cloud
+                if str(outcome.error) not in failures:
+                    failures[str(outcome.error)] = outcome.error
+                    observer.failed(outcome.error)
                 continue
             if in_units:  # else the sink has written it, and counts itself
                 opened.count()
@@ -176,11 +179,11 @@ def clean(
             else:
                 observer.cleaned(outcome)
             before += result.before
-            cleaned.append(outcome.figures)
+            cleaned[key] = outcome.figures
     # How many clouds the bags of a store have shows only when they are fetched.
-    scans = sum(max(len(unit.frames), found[unit.id]) for unit in units)
-    not_cleaned = max(scans - len(cleaned), len(failures))
-    return CleanReport(cleaned, failures, monitor, before, not_cleaned)
+    scans = sum(max(len(unit.frames), len(found[unit.id])) for unit in units)
+    not_cleaned = scans - len(cleaned)
+    return CleanReport([*cleaned.values()], [*failures.values()], monitor, before, not_cleaned)
 
 
 def _is_stored(source: Source, sink: CleanSink) -> bool:

@@ -68,7 +68,8 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
             on_judgement: Receives each judgement.
 
         Yields:
-            Outcomes of all scans.
+            Outcomes of all scans; then, of a bag that could not be written, failures of all its
+            clouds.
         """
 
         def result(frame: Frame, judgement: Judgement, stopwatch: Stopwatch) -> ScanOutcome:
@@ -84,6 +85,8 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
                 issues=[*doubts.get(key, ()), *outcome.issues],
                 recording=f"{unit.id} {numbers[key]}" if key in numbers else None,
             )
+        for frame, error in sink.finish_bags(unit.frames):
+            yield self.failure(frame, error)
 
     def look(self) -> IsThere[FrameUnit, ScanOutcome]:
         """Looks up the results written so far."""

@@ -12,6 +12,7 @@ from contents import contents
 from numpy.typing import NDArray
 from small_bags import bag_path, small_bag, storage_file, tables
 
+import derain
 from benchmarks.recorded_bags import (
     CLOUD_TYPE,
     PERIOD,
@@ -137,7 +138,11 @@ def test_a_cloud_that_cannot_be_cleaned_stays_and_is_named(tmp_path, run_derain)
     assert [b == a for b, a in clouds] == [False, True, True, True, False]
 
 
-def test_nothing_is_left_of_a_bag_that_breaks_off(tmp_path, run_derain, monkeypatch) -> None:
+@pytest.mark.parametrize("end", [2, 11])  # before the second cloud, and after the last one
+@pytest.mark.parametrize("options", [(), ("--resume",)])
+def test_nothing_is_left_of_a_bag_that_breaks_off_and_its_error_comes_once(
+    tmp_path, run_derain, monkeypatch, end, options
+) -> None:
     from rosbags import rosbag2
 
     bag = small_bag(tmp_path, "sqlite3")
@@ -145,15 +150,17 @@ def test_nothing_is_left_of_a_bag_that_breaks_off(tmp_path, run_derain, monkeypa
 
     def breaking_off(self, *arguments, **options):
         for number, message in enumerate(messages(self, *arguments, **options)):
-            if number == 2:
+            if number == end:
                 raise rosbag2.ReaderError("Chunk checksum mismatch.")
             yield message
 
     monkeypatch.setattr(rosbag2.Reader, "messages", breaking_off)
-    outcome = run_derain(*RUN, bag, "--out", tmp_path / "out")
+    np.save(tmp_path / "scan.npy", tables(1)[0])
+    outcome = run_derain(*RUN, bag, tmp_path / "scan.npy", "--out", tmp_path / "out", *options)
     assert outcome.code == 2
-    assert "Chunk checksum mismatch" in outcome.err
-    assert os.listdir(tmp_path / "out") == []
+    assert outcome.err.count("Chunk checksum mismatch") == 1
+    assert "3 of 4 scans could not be cleaned" in outcome.err
+    assert contents(tmp_path / "out").keys() == {"scan.npy", "scan.label"}
 
 
 def test_several_bags_and_scans_are_cleaned_in_one_run(tmp_path, run_derain) -> None:
@@ -165,6 +172,16 @@ def test_several_bags_and_scans_are_cleaned_in_one_run(tmp_path, run_derain) -> 
     assert (outcome.code, outcome.messages) == (0, [])
     files = {"c/000001.label", "c/000001.pcd", "scan.label", "scan.npy"}
     assert contents(tmp_path / "out").keys() == {"a/a.mcap", "a/metadata.yaml", "b.bag", *files}
+
+
+def test_a_bag_may_be_cleaned_in_parts(tmp_path, rain) -> None:
+    source = named_frames(small_bag(tmp_path, "mcap"))
+    ror = FilterDerainer(ROR(radius=2, neighbours=3))
+    with derain.CleanSink(tmp_path / "out", source) as sink:
+        for part in (source[:2], source[2:]):
+            derain.clean(part, ror, sink, most_removed=1)
+    cleaned = named_frames(tmp_path / "out/drive")
+    assert [len(frame.read()) for frame in cleaned] == [int((~mask).sum()) for mask in rain]
 
 
 @pytest.mark.parametrize(
