@@ -16,6 +16,7 @@ from derain.sources.records import poses_along
 from derain.sources.source import Frames
 from derain.sources.stored_frame import StoredBag
 from derain.sources.trajectory import read_trajectory
+from derain.sources.unreadable_bag import UnreadableBag
 from derain.views.scan_issues import ScanIssue
 
 # What stands for poses that are in no file.
@@ -117,8 +118,11 @@ def _with_file_poses(source: Sequence[Frame], path: Path) -> Frames:
     posed: list[Frame] = []
     for recording in recordings:
         file = path / f"{recording[0].sequence}.txt" if folder else path
-        trajectory = read_trajectory(file)
         bag = recording[0]
+        if isinstance(bag, UnreadableBag):
+            posed.append(bag)
+            continue
+        trajectory = read_trajectory(file)
         if isinstance(bag, StoredBag):  # whose clouds are known when it is fetched
             posed.append(replace(bag, trajectory=trajectory))
             continue

@@ -21,6 +21,7 @@ from derain.sources.frame import Frame, MemoryFrame
 from derain.sources.records import Records
 from derain.sources.search import listed_scans, recordings_below, scans_or_bags
 from derain.sources.source import Frames, Source
+from derain.sources.unreadable_bag import UnreadableBag
 from derain.stores.url import is_url
 
 # Returns the clouds of a bag, or those at a path into one. Arguments: the path; whether to read
@@ -75,8 +76,8 @@ def named_frames(
         recording's path relative to that folder, which does not change if others are added.
 
     Raises:
-        InputError: A path that does not exist, a folder without scans, a bag that cannot be read,
-            or a topic where there is no bag.
+        InputError: A path that does not exist, a folder without scans, a named bag that cannot be
+            read, or a topic where there is no bag. A bag in a folder fails when it is read.
     """
     given = [paths] if isinstance(paths, str | Path) else paths
     finder = FrameFinder(columns, labelled, layouts, recordings, topic, results)
@@ -126,7 +127,7 @@ class FrameFinder:
             place = path.relative_to(folder)
             if is_bag(path):
                 name = place.with_name(stem(path)).as_posix()
-                for frame in self._clouds(path, name):
+                for frame in self._clouds_of_found(path, name):
                     yield replace(frame, sequence=name)
             else:
                 name = place.as_posix()
@@ -150,11 +151,20 @@ class FrameFinder:
         files = iter(frames_of(scans, label_path, self.columns, keys))
         several = several or len(paths) > 1 or any(len(bags) > 1 for _, bags in found)
         frames: list[Frame] = []
-        for scans_at_path, bags in found:
+        for path, (scans_at_path, bags) in zip(paths, found, strict=True):
             frames += islice(files, len(scans_at_path))
             for bag in bags:
-                frames += self._clouds(bag, _bag_name(bag) if several else "")
+                clouds_of = self._clouds if bag == path else self._clouds_of_found
+                frames += clouds_of(bag, _bag_name(bag) if several else "")
         return frames
+
+    def _clouds_of_found(self, bag: Path, prefix: str) -> Sequence[Frame]:
+        """The clouds of a bag in a folder, which must not stop the others where it fails."""
+        try:
+            return self._clouds(bag, prefix)
+        except InputError as error:
+            key = prefix or stem(bag)
+            return [UnreadableBag(key=key, sequence=stem(bag), path=bag, error=error)]
 
     def _clouds(self, bag: Path, prefix: str) -> Sequence[Frame]:
         """The clouds of a bag, or those at a path into one."""

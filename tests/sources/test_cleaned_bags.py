@@ -19,6 +19,8 @@ from benchmarks.recorded_bags import (
     POINTS,
     START,
     STORAGES,
+    TEXT,
+    TEXT_TYPE,
     Recorded,
     Ros,
     Storage,
@@ -283,6 +285,29 @@ def test_bags_of_one_name_in_a_folder_of_recordings_are_written_apart(
     for name in ("a", "b"):
         made = bag_path(tmp_path / "out" / name, storage)
         assert read_bag(made) == read_bag(bag_path(tmp_path / "once", storage))
+
+
+@pytest.mark.parametrize("options", [(), ("--resume",), ("--poses", "poses")])
+@pytest.mark.parametrize("inside", ["", "day"])  # of a folder of bags, and of a folder of those
+def test_bags_in_a_folder_that_cannot_be_read_do_not_stop_the_others(
+    tmp_path, run_derain, inside, options, monkeypatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    folder = tmp_path / "fleet" / inside
+    small_bag(folder, "mcap", "whole")
+    text = Recorded(TEXT, TEXT_TYPE, START, Ros("ros1").text("no cloud"))
+    small_bag(folder, "ros1", "no_clouds", clouds=[], more=[text])
+    os.truncate(small_bag(folder, "ros1", "cut"), 10_000)
+    (tmp_path / "poses" / inside).mkdir(parents=True)
+    (tmp_path / "poses" / inside / "whole.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * 3)
+    outcome = run_derain(*RUN, tmp_path / "fleet", "--out", tmp_path / "out", *options)
+    assert outcome.code == 2
+    assert outcome.err.count(f"{folder / 'cut.bag'}: cannot be read as a bag") == 1
+    assert outcome.err.count(f"{folder / 'no_clouds.bag'}: holds no point clouds") == 1
+    assert "2 of 5 scans could not be cleaned" in outcome.err
+    assert bool(read_bag(tmp_path / "out" / inside / "whole"))
+    named = run_derain(*RUN, folder / "whole", folder / "cut.bag", "--out", tmp_path / "named")
+    assert (named.code, (tmp_path / "named").exists()) == (2, False)
 
 
 def test_a_bag_is_not_written_over_the_results_of_a_folder_of_its_name(
