@@ -45,7 +45,7 @@ def threads_of(threads: Any) -> int:
     cores = usable_cores()
     if not isinstance(threads, Integral) or threads < 0:
         reason = f"{threads!r} is not a whole number from 0 on"
-    elif threads > max(2 * cores, MOST_ON_FEW_CORES):
+    elif int(threads) > max(2 * cores, MOST_ON_FEW_CORES):
         reason = f"{threads} are too many for {cores} cores"
     else:
         return int(threads) or cores
