@@ -232,8 +232,8 @@ class Cues:
                 brightness.
         """
         rain = rain.clamp(-CERTAIN, CERTAIN)
-        of_geometry = self._calibration(rain.sigmoid())
-        first = of_geometry.log_odds[:-1].flatten().to(rain.dtype)
+        calibrated = self._calibration(rain.sigmoid())
+        first = calibrated.log_odds[:-1].flatten().to(rain.dtype)
         with_first = rain + SHARE_ADDED * taken(first, self._cell_of_isolated)
         by_cell = self._calibration(with_first.sigmoid()).by_cell().to(rain.dtype)
         brightness, of_scan, *of_shell, separation = taken_of_each(by_cell, self._cell).split(1)
@@ -242,7 +242,7 @@ class Cues:
         others = taken(with_crowded, self._others)
         brightness_of_others = taken(by_cell[0], self._cell_of_others)
         of_scan_of_others = taken(by_cell[1], self._cell_of_others)
-        drops = of_geometry.rain[-1].sum().log1p().to(rain.dtype)
+        drops = calibrated.rain[-1].sum().log1p().to(rain.dtype)
         return torch.cat(
             [
                 own / 4,
@@ -329,9 +329,10 @@ class Brightness:
     def by_cell(self) -> Tensor:
         """What is known of each shell and rank together, float64 (6, SHELLS * INTENSITY_RANKS).
 
-        Log-odds of rain by shell and rank, and by rank alone, for shells that hold few drops;
-        the points of rain in the shell; how well intensity tells its rain from the rest; its share
-        of rain; and how well intensity tells rain from the rest in the whole scan.
+        Half of the log-odds of rain by shell and rank, and by rank alone, for shells that hold few
+        drops; a quarter of the logarithm of the points of rain in the shell; how well intensity
+        tells its rain from the rest; its share of rain; and how well intensity tells rain from the
+        rest in the whole scan.
         """
         separation = (self._share(self.rain) * self.log_odds).sum(1, keepdim=True)
         rain, rest = (each[:-1].sum(1, keepdim=True) for each in (self.rain, self.rest))
