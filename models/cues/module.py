@@ -112,7 +112,10 @@ class CueFusion(SupervisedModule):
         target = batch.target[judged].to(answers[0].dtype)
         weight = self.class_weight[batch.target[judged]]
         each = [
-            functional.binary_cross_entropy_with_logits(answer[judged], target, weight)
+            functional.binary_cross_entropy_with_logits(
+                answer[judged], target, weight, reduction="sum"
+            )
+            / max(len(target), 1)  # a batch may hold no isolated point with a label
             for answer in answers[:-1]  # the last, as judged, is not learnt
         ]
         loss = torch.stack([share * one for share, one in zip(WEIGHTS, each, strict=True)]).sum()

@@ -137,6 +137,13 @@ def test_scans_of_a_batch_do_not_influence_each_other(trained) -> None:
     torch.testing.assert_close(together, apart)
 
 
+def test_a_batch_without_a_point_to_learn_from_has_no_loss(trained) -> None:
+    empty = Scan.of(np.zeros((0, 4))).with_label(np.zeros(0, np.int64))
+    seen = trained.spec.make_view()(empty)
+    losses, _ = trained.losses(Batch.of([Sample.of(empty, seen, trained.card)]))
+    assert losses["loss"] == 0
+
+
 def test_it_needs_its_neighbours_and_a_start_of_its_kind() -> None:
     with pytest.raises(InputError, match="neighbours: 8 are too few"):
         CueFusion(neighbours=8)
