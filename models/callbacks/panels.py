@@ -172,8 +172,10 @@ class ErrorPanels(lightning.Callback):
         self, trainer: lightning.Trainer, model: DerainingModule, part: str, step: int
     ) -> None:
         # All processes put the counts together, the first one draws.
-        points = model.threshold_counts.points()
-        table = model.metrics.counts().by_class_and_range()
+        points, measured = model.threshold_counts.points(), model.metrics.counts()
+        if not any(counts.points for counts in measured.by_class().values()):
+            return  # as of scans that hold no point, or none whose class is known
+        table = measured.by_class_and_range()
         title = f"{part} on {model.card.name}, step {step:,}"
         for logger in trainer.loggers:
             if not isinstance(logger, TensorBoardLogger) or not trainer.is_global_zero:

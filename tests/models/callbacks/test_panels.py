@@ -23,6 +23,7 @@ from derain.files.labels import write_labels
 from derain.models.callbacks import panels
 from derain.models.callbacks.panels import CHARTS, Dashboard, DrawnEpochs, ErrorPanels, ScanPanels
 from derain.models.outdet import OutDet
+from derain.pictures.error_pictures import errors_figure
 from derain.scan import Scan
 
 SNOW = 110
@@ -226,6 +227,14 @@ def test_no_pictures_leave_the_numbers(train) -> None:
     _, _, events = train(1, ErrorPanels(0))
     assert not events.Tags()["images"]
     assert "errors_by_class/falling-snow" in events.Tags()["scalars"]
+
+
+def test_scans_without_a_point_have_no_errors(make_trainer, data, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(panels, "errors_figure", errors_figure)
+    empty = Scan.of(np.zeros((0, 4))).with_label(np.zeros(0, np.int64))
+    nothing = InMemory(data.source("train"), [empty], card="wads")
+    log = TensorBoardLogger(tmp_path, "", "log")
+    make_trainer(1, callbacks=[ErrorPanels()], logger=log).fit(OutDet(), nothing)
 
 
 def test_scans_without_labels_have_no_errors(make_trainer, data, tmp_path) -> None:
