@@ -104,6 +104,7 @@ def road_plane(scans: Sequence[Scan], scene: Scene) -> Plane:
             be imported.
     """
     points = np.concatenate([_bare_road(scan, scene) for scan in scans])
+    points = points[np.lexsort(points.T)]  # what is drawn must not depend on the order of rows
     remedy = "Check the scene's road polygon, which is in the sensor's frame."
     if len(points) < POINTS_OF_A_PLANE:
         reason = f"{len(points)} points over the road are too few for a plane"
