@@ -9,11 +9,12 @@ from lightning.pytorch.trainer.states import TrainerFn
 from derain.cards.rain_found import warn_without_rain
 from derain.datamodules.base import Part, ScanDataModule
 from derain.sources.spread import evenly_spaced
-from derain.system.notices import Notices
+from derain.sources.training_record import training_overlap
+from derain.system.notices import Notices, warn
 
 
 class ScanCheck(lightning.Callback):
-    """Warns where scans lack a channel of the model, or have intensities of another unit.
+    """Warns of scans without a channel of the model, of another unit, or that it was trained on.
 
     It checks before the first batch: hours of training on a wrong unit would be lost.
 
@@ -63,6 +64,11 @@ class ScanCheck(lightning.Callback):
             found = model.spec.issues(data.read(frame))
             notices.warn(frame.name, [replace(o, detail=_here(o.detail)) for o in found])
         notices.warn_of_repeats()
+        if part in ("validation", "test"):
+            frames = data.frames(part)
+            note = training_overlap("the model", model.spec, model.card, frames)
+            if note is not None:
+                warn(note)
 
 
 def _warn_without_rain(trainer: lightning.Trainer, model: Any) -> None:

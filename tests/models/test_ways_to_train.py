@@ -154,6 +154,15 @@ def test_measuring_on_scans_without_rain_is_warned_of_once(make_trainer, memory,
         assert warning not in capsys.readouterr().err
 
 
+def test_measuring_on_scans_of_the_training_is_warned_of(make_trainer, memory, capsys) -> None:
+    model, trained_on = OutDet(), InMemory(*2 * [memory.source("train")], card="wads")
+    make_trainer(1, callbacks=[ScanCheck()]).fit(model, trained_on)
+    assert "was trained on" not in capsys.readouterr().err
+    for data, times in ((trained_on, 1), (memory, 0)):
+        make_trainer(1, callbacks=[ScanCheck()]).validate(model, data, verbose=False)
+        assert capsys.readouterr().err.count("the model was trained on") == times
+
+
 def test_callbacks_go_without_a_data_module(make_trainer, memory, capsys, tmp_path) -> None:
     model = OutDet()
     task = agree_on_task(model, memory)
