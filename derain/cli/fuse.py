@@ -146,8 +146,7 @@ def _read(frame: Frame, option: str) -> Scan:
     try:
         return frame.read()
     except InputError as error:
-        texts = str(error.subject), error.reason, error.remedy
-        raise InputError(*(text.replace("--columns", option) for text in texts)) from error
+        raise error.with_option("--columns", option) from error
 
 
 def _write_metadata(

@@ -2,6 +2,7 @@
 
 import shlex
 
+from derain.errors import InputError
 from derain.system.extras import TRAINING_LIBRARIES, require
 from derain.workflows.configurations import packaged_configs, require_configuration
 
@@ -92,7 +93,10 @@ def train(arguments: list[str]) -> int:
 
     words = ["--help" if argument == ALL else argument for argument in arguments]
     callbacks = {"callbacks": [EpochLines()]}
-    trainer = run_trainer(words, EXAMPLES[arguments[0]], callbacks).trainer
+    try:
+        trainer = run_trainer(words, EXAMPLES[arguments[0]], callbacks).trainer
+    except InputError as error:
+        raise error.with_option("--columns", "--data.loading.columns") from error
     best = getattr(trainer.checkpoint_callback, "best_model_path", "")
     if arguments[0] == "fit" and best and trainer.is_global_zero:
         print_lines(f"Best checkpoint: {best}")

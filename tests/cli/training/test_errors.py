@@ -49,3 +49,13 @@ def test_a_configuration_is_refused_in_a_line(last_line, content, message) -> No
     Path("mine.yaml").write_text(content)
     assert message in last_line(*FIT, "--config", "mine.yaml")
     assert not Path("runs").exists()
+
+
+def test_the_remedy_for_columns_is_an_option_of_training(last_line) -> None:
+    Path("scan.bin").write_bytes(bytes(36))
+    Path("scan.label").write_bytes(bytes(8))
+    data = ("--data", "Folder", "--data.root", ".", "--data.card", "wads")
+    parts = ("--data.train", "['scan.bin']", "--data.validation", "['scan.bin']")
+    line = last_line("fit", "--model", "OutDet", *data, *parts)
+    assert "--data.loading.columns" in line
+    assert " --columns" not in line
