@@ -62,9 +62,13 @@ def main(arguments: argparse.Namespace) -> int:
         raise InputError(
             "--data", f"{data.name} has no rain", "Give the card of the weights' training data."
         )
-    model = published[name].from_published(
-        read_state_dict(arguments.weights), data.normalised_as(stats), arguments.grid
-    )
+    weights = read_state_dict(arguments.weights)
+    try:
+        model = published[name].from_published(weights, data.normalised_as(stats), arguments.grid)
+    except InputError as error:
+        if str(error.subject).startswith("--"):
+            raise
+        raise InputError(arguments.weights, error.reason, error.remedy) from error
     model.adopt(replace(model.spec, training=record_of_sequences(data.split.get("train", ()))))
     save_model(model, arguments.out)
     print_lines(

@@ -83,7 +83,7 @@ def test_a_checkpoint_as_salsanext_saves_it_comes_with_its_grid(succeed, random_
         ("outdet", "published.pt", ("rehearse3d",), "the data card has no statistics"),
         ("outdet", "published.pt", ("semantickitti",), "--data: SemanticKITTI has no rain"),
         ("outdet", "published.pt", ("wads", "--grid", "wads"), "--grid: outdet sees neighbours"),
-        ("outdet", "other.pt", ("wads",), "the state_dict is of another network (1 keys missing"),
+        ("outdet", "other.pt", ("wads",), "other.pt: the state_dict is of another network (1"),
         ("salsanext", "published.pt", ("wads",), "the state_dict is of another network"),
     ],
 )
