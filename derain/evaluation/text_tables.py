@@ -21,8 +21,9 @@ def markdown_table(head: Sequence[str], body: Sequence[Sequence[str]]) -> str:
         head: Titles of the columns.
         body: The cells of each row.
     """
-    widths = _widths([head, *body])
-    lines = [f"| {' | '.join(_padded(cells, widths))} |" for cells in (head, *body)]
+    rows = [[_in_markdown(cell) for cell in cells] for cells in (head, *body)]
+    widths = _widths(rows)
+    lines = [f"| {' | '.join(_padded(cells, widths))} |" for cells in rows]
     rule = "|".join(["", "-" * (widths[0] + 2), *("-" * (w + 1) + ":" for w in widths[1:]), ""])
     return "\n".join([lines[0], rule, *lines[1:]])
 
@@ -35,6 +36,11 @@ def plain_table(rows: Sequence[Sequence[str]]) -> str:
     """
     widths = _widths(rows)
     return "\n".join(f"  {'  '.join(_padded(cells, widths))}".rstrip() for cells in rows)
+
+
+def _in_markdown(cell: str) -> str:
+    """A cell on one line, without an end of the cell in it."""
+    return " ".join(cell.split()).replace("|", "\\|")
 
 
 def _widths(rows: Sequence[Sequence[str]]) -> list[int]:

@@ -182,6 +182,7 @@ def test_a_return_whose_ray_met_something_that_is_no_row_has_met_no_rain() -> No
 
 def test_tables_line_up_and_a_number_that_is_undefined_is_a_dash() -> None:
     assert [*map(number_text, (0.12345, 0, math.nan, None))] == ["0.123", "0.000", "-", "-"]
+    assert markdown_table(["a|b"], [["c\nd"]]).splitlines() == ["| a\\|b |", "|------|", "| c d  |"]
     text = markdown_table(["method", "IoU"], [["a", "0.5"], ["longer one", "0.25"]])
     assert text.splitlines() == [
         "| method     |  IoU |",
