@@ -18,9 +18,8 @@ GROUPS = Path("/sys/fs/cgroup")
 # Source: Linux, Documentation/scheduler/sched-bwc.rst; Documentation/admin-guide/cgroup-v2.rst.
 QUOTA_FILES = (("cpu.cfs_quota_us", "cpu.cfs_period_us"), ("cpu.max",))
 
-# Threads that any machine may be asked for, as by a script that is written for a larger one. Of
-# thousands each takes memory and time, and the process no longer ends by a signal.
-MOST_ON_FEW_CORES = 64
+# The most threads that may be asked for. Each takes memory, and a million take all of it.
+MOST_THREADS = 1024
 
 # How OpenMP's threads wait, which it reads once, when it is loaded.
 # Source: OpenMP 5.2, 21.7, OMP_WAIT_POLICY.
@@ -40,15 +39,14 @@ def threads_of(threads: Any) -> int:
     """Number of threads for a user's option, in which 0 means one per core.
 
     Raises:
-        InputError: Anything but a whole number from 0 on, or far more than there are cores.
+        InputError: Anything but a whole number from 0 to MOST_THREADS.
     """
-    cores = usable_cores()
     if not isinstance(threads, Integral) or threads < 0:
         reason = f"{threads!r} is not a whole number from 0 on"
-    elif int(threads) > max(2 * cores, MOST_ON_FEW_CORES):
-        reason = f"{threads} are too many for {cores} cores"
+    elif int(threads) > MOST_THREADS:
+        reason = f"{threads} are more than {MOST_THREADS:,}"
     else:
-        return int(threads) or cores
+        return int(threads) or usable_cores()
     raise InputError("threads", reason, "Give 0 for every core.")
 
 

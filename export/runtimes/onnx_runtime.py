@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from derain.export.model_file import ModelFile
 from derain.export.runtimes.session import DEFAULT_RUNTIME, RUNTIMES, Session, TensorType
+from derain.system.cores import usable_cores
 
 # NumPy's names of what onnxruntime calls the types of a view's inputs and of scores.
 NUMPY_NAMES = {"tensor(float)": "float32", "tensor(int64)": "int64", "tensor(bool)": "bool"}
@@ -29,7 +30,8 @@ class OnnxRuntimeSession(Session):
 
         options = onnxruntime.SessionOptions()
         # Always stated: the default counts the host's cores, not those a container may use.
-        options.intra_op_num_threads = threads
+        # More threads than cores would spin against each other.
+        options.intra_op_num_threads = min(threads, usable_cores())
         options.inter_op_num_threads = 1
         options.log_severity_level = 3
         # It would reserve memory for each size of scan anew, beside what other sizes have left.

@@ -71,8 +71,7 @@ def test_where_there_are_no_control_groups_it_is_the_cores_it_may_run_on(
 def test_threads_are_a_whole_number_and_none_are_one_for_each_core() -> None:
     assert threads_of(0) == usable_cores()
     assert threads_of(3) == 3
-    assert threads_of(2 * usable_cores()) == 2 * usable_cores()
-    for threads in (-1, 1.5, "2", None, 1000 * usable_cores()):
+    for threads in (-1, 1.5, "2", None, 10**6):
         with pytest.raises(InputError, match="threads: "):
             threads_of(threads)
 
