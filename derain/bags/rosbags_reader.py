@@ -13,7 +13,12 @@ from typing import Any, BinaryIO
 from derain.bags.names import logs_of
 from derain.bags.unpacking import MOST_UNPACKED, unpack
 from derain.errors import InputError
+from derain.files.reading import reading
 from derain.system.extras import APSW, ROSBAGS
+
+# Bytes at the beginning of a log of SQLite, which are 0 or missing where all of it is written.
+# Source: SQLite, "Database File Format", section 3: the header of a rollback journal.
+LOG_HEAD = 28
 
 # The most topics of a bag, where each publisher of ROS 1 counts as one. The library's time grows
 # with their square, and a metadata.yaml that lists many more is too large to be read.
@@ -177,7 +182,7 @@ def _checked_databases(path: Path) -> Iterator[None]:
     apsw = APSW.load(path)
 
     def check(database: Any) -> None:
-        _refuse_log(path, Path(database.filename))
+        _refuse_log(Path(database.filename))
         database.limit(apsw.SQLITE_LIMIT_LENGTH, MOST_UNPACKED)
         listed = "SELECT name FROM sqlite_schema WHERE name IN ('topics', 'message_definitions')"
         for (table,) in database.execute(listed).fetchall():
@@ -192,12 +197,14 @@ def _checked_databases(path: Path) -> Iterator[None]:
         apsw.connection_hooks.remove(check)
 
 
-def _refuse_log(bag: Path, database: Path) -> None:
-    for log in logs_of(database):
-        if log.stat().st_size:
-            raise InputError(
-                bag,
-                f"{log.name} holds changes that are not in {database.name} yet",
-                "End the recording. After a crash, have SQLite join copies of the two files: "
-                f"sqlite3 {database.name} 'PRAGMA wal_checkpoint(TRUNCATE)'.",
-            )
+def _refuse_log(database: Path) -> None:
+    for log in logs_of(database) if database.name else ():  # one in memory has no name
+        with reading(log), log.open("rb") as file:
+            if not any(file.read(LOG_HEAD)):
+                continue
+        raise InputError(
+            database,
+            f"{log.name} holds changes that are not in it yet",
+            "End the recording. After a crash, copy both files and have SQLite write the log into "
+            f"the copy: sqlite3 {database.name} 'PRAGMA wal_checkpoint(TRUNCATE)'.",
+        )
