@@ -170,11 +170,12 @@ def _register(frame: Frame, odometry: FrameOdometry, guard: Guard, watch: Watch)
 
 def _write(found: FoundPoses, form: PoseFormat) -> None:
     registrations = found.registrations
-    if len(registrations) > 1 and not any(each.trusted for each in registrations[1:]):
+    moves = registrations[1:] or registrations
+    if not any(each.trusted for each in moves):
         raise InputError(
             found.file,
             "was not written: no two scans of the recording could be registered to one another "
-            f"({registrations[1].reason})",
+            f"({moves[0].reason})",
             "Check that they are consecutive, in order of time, and of one sensor.",
         )
     poses = np.array([each.pose for each in registrations])
