@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from derain.errors import InputError
 from derain.scan import Scan
 from derain.sources.file_frame import FileFrame
@@ -30,6 +33,18 @@ class UnreadableBag(FileFrame):
         """Raises the error."""
         raise self.error
 
+    def read_label(self, points: int) -> NDArray[np.int64]:
+        """Raises the error."""
+        raise self.error
+
     def count_points(self) -> int:
+        """Raises the error."""
+        raise self.error
+
+    def fingerprint(self) -> str:
+        """Raises the error."""
+        raise self.error
+
+    def checksums(self) -> tuple[str, str | None]:
         """Raises the error."""
         raise self.error
