@@ -68,6 +68,7 @@ from derain.example import Truth
 from derain.export.methods import DELAY, PAST, over_recording
 from derain.export.runtime import Derainer
 from derain.files.labels import LABEL
+from derain.sources.bag_frame import BagFrame
 from derain.sources.clean_sink import CleanSink, require_probabilities
 from derain.sources.cleaned_bags import RAIN_PROBABILITY, BagOptions
 from derain.sources.cleaned_scan import ScanOutcome
@@ -175,8 +176,10 @@ def main(arguments: argparse.Namespace) -> int:
         printer = _Printer(arguments.out, rows, arguments.json)
         if name == DEFAULT:
             printer.introduce_default()
-        listed = (frame for frame in source if not isinstance(frame, StoredBag))
         needed = not single_scan_method.window.is_one_scan
+        # Times of a bag are known when it has been read through.
+        unread = StoredBag if needed else StoredBag | BagFrame
+        listed = (frame for frame in source if not isinstance(frame, unread))
         for sentence in irregularities(listed, method.window, needed=needed):
             warn(sentence)
         report = clean(
