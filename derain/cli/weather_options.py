@@ -133,19 +133,19 @@ def weather_table(path: Path | None, results: Iterable[Path]) -> Iterator[list[S
     namesakes = (result for result in results if result.name == path.name)
     if os.path.realpath(path) in map(os.path.realpath, namesakes):
         raise InputError(path, "is a file of the results", remedy)
-    before = b""
+    lines = 0
     if is_file(path):
-        with reading(path):
-            before = path.read_bytes()
-        if before and not before.startswith(FIRST_COLUMNS):
-            raise InputError(path, "exists, and is not a table of the weather", remedy)
+        with reading(path), path.open("rb") as file:
+            if file.read(len(FIRST_COLUMNS)) not in (FIRST_COLUMNS, b""):
+                raise InputError(path, "exists, and is not a table of the weather", remedy)
+            lines = sum(1 for _ in file)
     require_writable(path)
     is_whole = False
     try:
         yield rows
         is_whole = True
     finally:  # scans cleaned before an error or the end of a pipe have their lines
-        if is_whole or before.count(b"\n") <= len(rows):
+        if is_whole or lines <= len(rows):
             table = io.StringIO()
             csv.writer(table, lineterminator="\n").writerows([TABLE_HEAD, *rows])
             write_text(path, table.getvalue(), newline="")

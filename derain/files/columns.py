@@ -98,23 +98,6 @@ def intensity_name(subject: str | Path, names: Iterable[str]) -> str | None:
     return next((name for name in found if name is not None), None)
 
 
-def names_of_a_scan(path: Path, names: Iterable[str]) -> list[str]:
-    """Those columns of a file that a scan is made of: coordinates, intensity and radar.
-
-    Args:
-        path: The file, for messages.
-        names: Names of its columns.
-
-    Raises:
-        InputError: Several columns match one name: see :func:`derain.scan.named`.
-    """
-    known = {name: name for name in names}
-    table = named(known, "xyz", path)
-    axes = [named(known, axis, path) for axis in "xyz"] if table is None else [table]
-    found = [*axes, intensity_name(path, known), named(known, "radar", path)]
-    return [name for name in found if name is not None]
-
-
 def _numbers(fields: Mapping[str, NDArray[Any]], *axes: int) -> dict[str, NDArray[Any]]:
     """The columns that hold numbers and have one of these numbers of axes."""
     return {

@@ -155,11 +155,8 @@ class SensorLook:
         for frame in evenly_spaced(frames, LOOKED_AT):
             with suppress(InputError):  # reported when the frame is written
                 scans.append(frame.read())
-        intensities = [
-            scan.measured_intensity[scan.valid]
-            for scan in scans
-            if scan.measured_intensity is not None
-        ]
+        measured = ((scan, scan.measured_intensity) for scan in scans)
+        intensities = [values[scan.valid] for scan, values in measured if values is not None]
         ranges = [scan.range[scan.valid] for scan in scans]
         try:
             view = RangeView(fit_grid(scans).grid, channels=())

@@ -69,7 +69,7 @@ def test_a_file_without_coordinates_is_refused(tmp_path, suffix) -> None:
 
 
 @pytest.mark.parametrize(
-    ("columns", "told"),
+    ("columns", "kinds"),
     [
         ({axis: np.zeros(5, np.complex64) for axis in "xyz"}, ["x is complex64", "z is complex64"]),
         ({"x": np.zeros(5), "y": np.zeros(5), "Z": np.zeros(5, bool)}, ["z is bool"]),
@@ -79,12 +79,12 @@ def test_a_file_without_coordinates_is_refused(tmp_path, suffix) -> None:
     ],
 )
 def test_coordinates_that_are_no_numbers_are_named_with_what_they_are(
-    tmp_path, columns, told
+    tmp_path, columns, kinds
 ) -> None:
     np.savez(tmp_path / "scan.npz", **columns)
     with pytest.raises(InputError) as refused:
         read_scan(tmp_path / "scan.npz", ("x", "y", "z"))
-    assert all(part in refused.value.reason for part in told)
+    assert all(part in refused.value.reason for part in kinds)
     assert "has no x, y and z" not in refused.value.reason
 
 

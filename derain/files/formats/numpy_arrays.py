@@ -13,7 +13,7 @@ from numpy.lib import format as npy_format
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.files.columns import columns_of, name_columns, names_of_a_scan, records, scan_of
+from derain.files.columns import columns_of, intensity_name, name_columns, records, scan_of
 from derain.files.content import Content, check_columns
 from derain.files.format import FORMATS, Format
 from derain.scan import Scan, has_points_as_columns, named
@@ -38,14 +38,14 @@ class NpzHeader:
         table: Name of the array that holds several columns, if there is one.
         columns: Their names.
         structured: True if they are named fields of that array.
-        upright: Names of the columns that the file holds as arrays (N, 1).
+        as_columns: Names of the columns that the file holds as arrays (N, 1).
     """
 
     constants: Mapping[str, NDArray[Any]]
     table: str | None = None
     columns: tuple[str, ...] = ()
     structured: bool = False
-    upright: frozenset[str] = frozenset()
+    as_columns: frozenset[str] = frozenset()
 
 
 @FORMATS.add(".npy")
@@ -119,12 +119,12 @@ class Npz(Format):
         if table is not None:
             structured = bool(arrays[table].dtype.names)
             fields = _columns_of_table(path, arrays.pop(table), columns)
-        stated, upright = tuple(fields), set[str]()
+        stated, as_columns = tuple(fields), set[str]()
         for name, array in arrays.items():
             if name in stated:
                 raise InputError(path, f"has an array {name} beside a column {name}", "Rename one.")
             if array.shape == (*grid, 1):
-                upright.add(name)
+                as_columns.add(name)
                 fields[name] = array.reshape(-1)
             elif array.shape[: len(grid)] == grid:
                 fields[name] = array.reshape(math.prod(grid), *array.shape[len(grid) :])
@@ -134,7 +134,7 @@ class Npz(Format):
             else:
                 constants[name] = array
         _refuse_other_points(path, grid, fields, constants)
-        header = NpzHeader(constants, table, stated, structured, frozenset(upright))
+        header = NpzHeader(constants, table, stated, structured, frozenset(as_columns))
         return scan_of(path, fields, shape, header)
 
     def encode(self, path: Path, scan: Scan) -> bytes:
@@ -146,8 +146,8 @@ class Npz(Format):
             table = {name: columns.pop(name) for name in header.columns}
             arrays[header.table] = _gridded(scan, _table(table, header.structured))
         for name, column in columns.items():
-            upright = name in header.upright and column.ndim == 1
-            arrays[name] = _gridded(scan, column[:, np.newaxis] if upright else column)
+            as_columns = name in header.as_columns and column.ndim == 1
+            arrays[name] = _gridded(scan, column[:, np.newaxis] if as_columns else column)
         arrays |= header.constants
         file = io.BytesIO()
         # Not numpy.savez, which cannot write an array named "file".
@@ -266,8 +266,11 @@ def _refuse_other_points(
 
     A single value, such as the number of a frame under the name i, is no column of anything.
     """
-    arrays = [name for name, array in constants.items() if array.ndim]
-    for name in names_of_a_scan(path, [*fields, *arrays]):
+    arrays = {name for name, array in constants.items() if array.ndim}
+    known = {name: name for name in (*fields, *arrays)}
+    axes = "xyz" if named(known, "xyz", path) is None else ("xyz",)
+    read = [named(known, name, path) for name in (*axes, "radar")]
+    for name in (*read, intensity_name(path, known)):
         if name in arrays:
             shape = constants[name].shape
             reason = f"the array {name} has shape {shape}, but the points have {grid}"
