@@ -59,13 +59,12 @@ class ScanCheck(lightning.Callback):
         data = trainer.datamodule  # type: ignore[attr-defined]
         if not isinstance(data, ScanDataModule):  # a user's own loaders are not checked
             return
-        notices = Notices()
-        for frame in evenly_spaced(data.frames(part), self.scans):
+        frames, notices = data.frames(part), Notices()
+        for frame in evenly_spaced(frames, self.scans):
             found = model.spec.issues(data.read(frame))
             notices.warn(frame.name, [replace(o, detail=_here(o.detail)) for o in found])
         notices.warn_of_repeats()
         if part in ("validation", "test"):
-            frames = data.frames(part)
             note = training_overlap("the model", model.spec, model.card, frames)
             if note is not None:
                 warn(note)

@@ -37,10 +37,10 @@ class InputError(ValueError):
         self.reason = reason
         self.remedy = remedy
 
-    def with_option(self, option: str, instead: str) -> "InputError":
+    def renaming_option(self, old: str, new: str) -> "InputError":
         """The same error, with one option named in place of another."""
         texts = str(self.subject), self.reason, self.remedy
-        return InputError(*(text.replace(option, instead) for text in texts))
+        return InputError(*(text.replace(old, new) for text in texts))
 
     def __reduce__(self) -> tuple[type["InputError"], tuple[str | Path, str, str]]:
         # An error crosses the process boundary of a data loader's worker by pickling.

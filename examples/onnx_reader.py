@@ -174,7 +174,7 @@ def candidate_rows(points: Points, spec: Spec) -> NDArray[np.bool_]:
 
 
 def neighbour_view(points: Points, spec: Spec) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
-    """The inputs of a point network, and the point of each row, -1 for invalid rows."""
+    """The inputs of a point network, and the point of each row, -1 for those at none."""
     first, inverse = distinct_points(points)
     every, k = np.arange(len(first)), spec["view"]["neighbours"]
     neighbours, distances = nearest(points, first, every, k)
@@ -255,7 +255,7 @@ def around_candidates(
 
 
 def isolated_view(points: Points, spec: Spec) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
-    """The inputs of a network of isolated points; the point of each row, -1 for invalid rows."""
+    """The inputs of a network of isolated points; the point of each row, -1 for those at none."""
     first, inverse = distinct_points(points)
     step, doubled = sampled(points, first)
     if doubled:

@@ -146,7 +146,7 @@ def _read(frame: Frame, option: str) -> Scan:
     try:
         return frame.read()
     except InputError as error:
-        raise error.with_option("--columns", option) from error
+        raise error.renaming_option("--columns", option) from error
 
 
 def _write_metadata(

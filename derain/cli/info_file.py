@@ -26,7 +26,7 @@ from derain.system.extras import CHECKPOINT_LIBRARIES, require
 from derain.system.notices import warn
 from derain.views.directions import directions
 from derain.views.grid_fit import fit_grid
-from derain.views.morton import distinct_rows
+from derain.views.morton import distinct_positions
 from derain.views.returns import pair_returns
 from derain.views.scan_issues import no_points
 
@@ -96,7 +96,7 @@ def _of_scan(scan: Scan, frame: Frame, card: DataCard | None) -> dict[str, Any]:
     facts = {
         "points": len(scan),
         "valid": int(valid.sum()),
-        "distinct positions": len(distinct_rows(scan)[0]),
+        "distinct positions": len(distinct_positions(points)[0]),
         "organised": "no" if scan.shape is None else f"{scan.shape[0]} x {scan.shape[1]}",
         "fields": {name: str(column.dtype) for name, column in scan.fields.items()},
         "x / m": _span(points[:, 0]),

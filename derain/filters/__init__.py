@@ -3,7 +3,7 @@
 One view of the neighbours serves them all (``filter_view``, ``PointFilter.judge``); one filter by
 itself takes the shortest way to the same verdict (``PointFilter.judge_scan``).
 
-They see the distinct valid positions of a scan (:class:`derain.views.neighbours.Neighbourhoods`).
+They see the distinct positions of a scan (:class:`derain.views.neighbours.Neighbourhoods`).
 Copies of a point count once: in a raw WADS scan 40 % of the rows are exact copies of others, and
 every one of them would have a neighbour at distance 0, which no drop has. Rows that cannot be
 judged are not rain.

@@ -196,7 +196,7 @@ def rows_of(points: NDArray[np.bool_], inverse: NDArray[np.int64]) -> NDArray[np
 
     Args:
         points: The verdicts, bool (M,).
-        inverse: Point of each row, int64 (N,); -1 for invalid rows, which are not rain.
+        inverse: Point of each row, int64 (N,); -1 for rows at no point, which are not rain.
     """
     # The last place is for rows at no point, whose number is -1.
     return np.append(points, False).take(inverse)

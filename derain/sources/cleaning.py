@@ -35,9 +35,9 @@ class CleanReport:
 
     Attributes:
         scans: The cleaned scans, in order.
-        failures: Why other scans were not cleaned; the reason of a whole bag once.
+        failures: Each reason why scans were not cleaned, once.
         weather: The weather of all scans that it is measured of: some, unless every one is asked
-            for.
+            for. Clouds of a bag that failed later are among them.
         before: Number of the cleaned scans that an earlier run had cleaned.
         not_cleaned: Number of scans that were not cleaned.
     """

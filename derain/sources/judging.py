@@ -37,7 +37,7 @@ class Failures:
         errors: The errors so far.
     """
 
-    def __init__(self, report: Callable[[InputError], None]) -> None:
+    def __init__(self, report: Callable[[InputError], None] = lambda error: None) -> None:
         self.errors: list[InputError] = []
         self._report = report
 

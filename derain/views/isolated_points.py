@@ -74,7 +74,7 @@ class IsolatedPoints(ViewedPoints):
         counts: Points of each scan by shell and rank of intensity, float32 (B, SHELLS,
             INTENSITY_RANKS).
         first: Row of the scan that each point was taken from, int64 (M,).
-        inverse: Point of each row of the scan, int64 (N,); -1 for invalid rows.
+        inverse: Point of each row of the scan, int64 (N,); -1 for rows at no point.
     """
 
     cell: NDArray[np.int64]

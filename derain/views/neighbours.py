@@ -31,7 +31,7 @@ class ViewedPoints(ViewedScan):
             distance, as rows of ``points``, int64 (F, k). Those that are scored come first.
         distances: Their distances in metres, float32 (F, k).
         first: Row of the scan that each point was taken from, int64 (M,).
-        inverse: Point of each row of the scan, int64 (N,); -1 for invalid rows.
+        inverse: Point of each row of the scan, int64 (N,); -1 for rows at no point.
     """
 
     points: NDArray[np.float32]
@@ -85,7 +85,7 @@ class ViewedPoints(ViewedScan):
 class Neighbourhoods(ViewedPoints):
     """One or more scans as a point network sees them.
 
-    The M points are the distinct valid positions of the scan, along a Morton curve. Of several rows
+    The M points are the distinct positions of the scan, along a Morton curve. Of several rows
     at one position the network sees the first, and all of them are given its score.
 
     Without candidates, each point has its neighbourhood and is scored: F = J = M. With them, J of
@@ -98,7 +98,8 @@ class Neighbourhoods(ViewedPoints):
             distance, as rows of ``points``, int64 (F, k).
         distances: Their distances in metres, float32 (F, k).
         first: Row of the scan that each point was taken from, int64 (M,).
-        inverse: Point whose score each row of the scan is given, int64 (N,); -1 for invalid rows.
+        inverse: Point whose score each row of the scan is given, int64 (N,); -1 for rows at no
+            point.
         candidates: Of each candidate the neighbourhoods of the points in its own, the first being
             its own, as rows of ``neighbours``, int64 (J, k). None where all points are scored.
     """

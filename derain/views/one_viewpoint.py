@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.scan import LARGEST_COORDINATE, Scan
+from derain.views.morton import MOST_COPIES
 from derain.views.scan_issues import ScanIssue
 
 # Azimuth, inclination and range of points, float64 (3, M).
@@ -141,11 +142,11 @@ def _no_returns_issue(scan: Scan, position: NDArray[np.float64]) -> ScanIssue:
     """The issue of a scan with many points at one position, float64 (3,)."""
     number = np.count_nonzero((scan.xyz == position).all(axis=1))
     x, y, z = position
+    judged = "" if number <= MOST_COPIES else " (only networks of range images judge such points)"
     return ScanIssue(
         "many points at one position",
         f"{number:,} points lie at ({x:g}, {y:g}, {z:g}) m, as rays without a return do in a frame "
-        "that is not the sensor's: leave them out, or judge scans before they are moved (only "
-        "networks of range images judge such points)",
+        f"that is not the sensor's: leave them out, or judge scans before they are moved{judged}",
     )
 
 

@@ -67,7 +67,7 @@ def teacher_answers(data: Taught) -> list[AnswersOfScan]:
 def beside_persistence(data: Taught, recording: Source) -> Answers:
     """Persistence's answers on held-out scans, and beside them what the teacher calls rain.
 
-    Neighbours of these that cannot be read are left out, as the teacher left them out.
+    Scans that cannot be read are left out.
 
     Args:
         data: The scans with the teacher's labels.
@@ -77,7 +77,7 @@ def beside_persistence(data: Taught, recording: Source) -> Answers:
     taught = {frame.key: frame for frame in data.frames("validation")[:MOST_EVALUATED]}
     shown = tqdm(_with_neighbours(recording, taught), "comparing", disable=None)
     found = []
-    guard = Failures(lambda error: None).skipping_failures
+    guard = Failures().skipping_failures
     for frame, judgement, _ in judgements(PersistenceDerainer(), shown, guard):
         if frame.key in taught:
             rain = answer_of(data.read(taught[frame.key]), data.card) == RAIN

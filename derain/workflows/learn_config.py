@@ -176,7 +176,7 @@ def student_of(config: LearnConfig, source: Source) -> Student:
 
 def _first_readable(source: Source) -> Scan:
     """The first scan that can be read; raises the error of the first if none can."""
-    failures = Failures(lambda error: None)
+    failures = Failures()
     for frame in source:
         with failures.skipping_failures(frame):
             return frame.read()

@@ -38,7 +38,7 @@ constexpr float kMostCrowded = 6.5F;
 struct IsolatedPoints {
   std::size_t k = 0;
   std::vector<std::int64_t> first;       // (M) row of the scan that each point was taken from
-  std::vector<std::int64_t> inverse;     // (N) point of each row of the scan; -1 for invalid rows
+  std::vector<std::int64_t> inverse;     // (N) point of each row of the scan; -1 for rows at no point
   std::vector<float> points;             // (M, 3)
   std::vector<std::int64_t> cell;        // (M) shell and rank of intensity
   std::vector<std::int64_t> neighbours;  // (S, k) points, each one's own first

@@ -25,7 +25,7 @@ constexpr std::ptrdiff_t kMostCopies = 50;
 struct NeighbourView {
   std::size_t k = 0;
   std::vector<std::int64_t> first;       // (M) row of the scan that each point was taken from
-  std::vector<std::int64_t> inverse;     // (N) point of each row of the scan; -1 for invalid rows
+  std::vector<std::int64_t> inverse;     // (N) point of each row of the scan; -1 for rows at no point
   std::size_t channels = 0;
   std::vector<float> points;             // (M, C)
   std::vector<std::int64_t> neighbours;  // (F, k) points, each one's own first

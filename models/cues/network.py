@@ -331,8 +331,8 @@ class Brightness:
 
         Half of the log-odds of rain by shell and rank, and by rank alone, for shells that hold few
         drops; a quarter of the logarithm of the points of rain in the shell; how well intensity
-        tells its rain from the rest; its share of rain; and how well intensity tells rain from the
-        rest in the whole scan.
+        separates its rain from the rest; its share of rain; and how well intensity separates rain
+        from the rest in the whole scan.
         """
         separation = (self._share(self.rain) * self.log_odds).sum(1, keepdim=True)
         rain, rest = (each[:-1].sum(1, keepdim=True) for each in (self.rain, self.rest))

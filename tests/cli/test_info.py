@@ -165,7 +165,7 @@ def test_a_scan_without_a_valid_point_has_no_grid(facts_of, refused, tmp_path) -
     [
         ([np.nan], "none"),
         ([np.inf, -np.inf], "none"),
-        # More than any sensor measures, so that no intensity counts; the number is still told.
+        # More than any sensor measures, so that no intensity counts; the number is still printed.
         ([np.inf, 3e7], {"min": 3e7, "median": 3e7, "max": 3e7}),
     ],
 )
