@@ -1,13 +1,18 @@
 """Small bags in every storage, and the same scans as files."""
 
-from collections.abc import Iterable
+import sqlite3
+from collections.abc import Callable, Iterable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 
 from benchmarks.recorded_bags import Recorded, Ros, Storage, drive, table_of, write_bag
+from derain.bags.bag import Bag
+from derain.bags.bag_copy import BagCopy
 from derain.evaluation.hard_cases import scene
 
 POINTS = 300
@@ -43,3 +48,31 @@ def small_bag(
 def storage_file(bag: Path) -> Path:
     """The file of a bag that holds its messages."""
     return bag if bag.is_file() else next(p for p in bag.iterdir() if p.suffix != ".yaml")
+
+
+def copied(path: Path, out: Path) -> Path:
+    """A copy of a bag in a folder that is made."""
+    bag = Bag(path)
+    out.mkdir()
+    with BagCopy(bag, bag.cloud_topic(), out) as copy:
+        return copy.finish()
+
+
+def change_database(bag: Path, statement: str) -> None:
+    """Changes a bag's messages, or what else its database holds, by SQL."""
+    with closing(sqlite3.connect(storage_file(bag))) as database, database:
+        database.execute(statement)
+
+
+def change_metadata(bag: Path, change: Callable[[dict[str, Any]], object]) -> None:
+    """Changes what ROS 2 writes beside a bag's messages, which stay as they are."""
+    path = bag / "metadata.yaml"
+    metadata = yaml.safe_load(path.read_text("utf-8"))
+    change(metadata["rosbag2_bagfile_information"])
+    path.write_text(yaml.safe_dump(metadata), "utf-8")
+
+
+def topic_of(information: dict[str, Any], name: str) -> dict[str, Any]:
+    """What the metadata of a bag state of a topic."""
+    topics = information["topics_with_message_count"]
+    return next(each for each in topics if each["topic_metadata"]["name"] == name)

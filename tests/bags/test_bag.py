@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
-from small_bags import bag_path, small_bag, storage_file, tables
+from small_bags import bag_path, change_metadata, small_bag, storage_file, tables, topic_of
 
 from benchmarks.recorded_bags import (
     CLOUD_TYPE,
+    POINTS,
     START,
     STORAGES,
     TEXT_TYPE,
@@ -108,21 +108,15 @@ def test_a_database_that_is_being_written_is_refused_until_its_log_is_in_it(
 )
 def test_metadata_that_the_library_does_not_know_is_refused(tmp_path, change, reason) -> None:
     bag = small_bag(tmp_path, "mcap")
-    metadata = yaml.safe_load((bag / "metadata.yaml").read_text("utf-8"))
-    metadata["rosbag2_bagfile_information"] |= change
-    (bag / "metadata.yaml").write_text(yaml.safe_dump(metadata), "utf-8")
+    change_metadata(bag, lambda information: information.update(change))
     assert reason in refusal(lambda: named_frames([bag]))
 
 
 def test_metadata_may_stand_for_the_file_it_describes(tmp_path) -> None:
     """As Python writes it, where ROS 2 would write it out."""
     bag = small_bag(tmp_path, "sqlite3")
-    metadata = yaml.safe_load((bag / "metadata.yaml").read_text("utf-8"))
-    information = metadata["rosbag2_bagfile_information"]
-    information["files"][0]["duration"] = information["duration"]
-    text = yaml.safe_dump(metadata)
-    assert "*id001" in text
-    (bag / "metadata.yaml").write_text(text, "utf-8")
+    change_metadata(bag, lambda each: each["files"][0].update(duration=each["duration"]))
+    assert "*id001" in (bag / "metadata.yaml").read_text("utf-8")
     assert read_all(bag) == 3
 
 
@@ -148,17 +142,10 @@ def test_clouds_of_one_stamp_are_warned_of_once(tmp_path, capsys) -> None:
     assert "000002: has the stamp of" in message
 
 
-@pytest.mark.parametrize(
-    ("stated", "reason"), [(10**15, "messages are stated in"), (5, "than the 5 of its index")]
-)
-def test_a_bag_with_fewer_clouds_than_it_states_is_refused(tmp_path, stated, reason) -> None:
+def test_a_bag_with_fewer_clouds_than_it_states_is_refused(tmp_path) -> None:
     bag = small_bag(tmp_path, "sqlite3")
-    metadata = yaml.safe_load((bag / "metadata.yaml").read_text("utf-8"))
-    for topic in metadata["rosbag2_bagfile_information"]["topics_with_message_count"]:
-        if topic["topic_metadata"]["name"] == "/velodyne_points":
-            topic["message_count"] = stated
-    (bag / "metadata.yaml").write_text(yaml.safe_dump(metadata), "utf-8")
-    assert reason in refusal(lambda: read_all(bag))
+    change_metadata(bag, lambda each: topic_of(each, POINTS).update(message_count=5))
+    assert "than the 5 of its index" in refusal(lambda: read_all(bag))
 
 
 def test_a_topic_with_a_nul_in_its_name_is_refused(tmp_path, storage) -> None:

@@ -1,44 +1,29 @@
 """What a bag holds besides messages is copied, warned of, or a reason to refuse."""
 
 import re
-import sqlite3
 from collections.abc import Callable
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
-from small_bags import small_bag, storage_file
+from small_bags import change_database, change_metadata, copied, small_bag, topic_of
 
 from benchmarks.fuzzing.false_indexes import ros1_with_index
 from benchmarks.recorded_bags import POINTS, TEXT
-from derain.bags.bag import Bag
-from derain.bags.bag_copy import BagCopy
 from derain.errors import InputError
 
 
-def copied(path: Path, out: Path) -> Bag:
-    bag = Bag(path)
-    out.mkdir()
-    with BagCopy(bag, bag.cloud_topic(), out) as copy:
-        return Bag(copy.finish())
+def without_text(information: dict[str, Any]) -> None:
+    information["topics_with_message_count"].remove(topic_of(information, TEXT))
 
 
-def change_database(bag: Path, statement: str) -> None:
-    with closing(sqlite3.connect(storage_file(bag))) as database, database:
-        database.execute(statement)
+def stating(clouds: int) -> Callable[[Path], None]:
+    """The index names so many clouds, of which there are three."""
 
+    def change(bag: Path) -> None:
+        change_metadata(bag, lambda each: topic_of(each, POINTS).update(message_count=clouds))
 
-def change_topics(bag: Path, change: Callable[[list[dict[str, Any]]], object]) -> None:
-    """Changes the topics of the metadata; the database has the same messages as before."""
-    metadata = yaml.safe_load((bag / "metadata.yaml").read_text("utf-8"))
-    change(metadata["rosbag2_bagfile_information"]["topics_with_message_count"])
-    (bag / "metadata.yaml").write_text(yaml.safe_dump(metadata), "utf-8")
-
-
-def topic_of(topics: list[dict[str, Any]], name: str) -> dict[str, Any]:
-    return next(each for each in topics if each["topic_metadata"]["name"] == name)
+    return change
 
 
 @pytest.mark.parametrize(
@@ -48,22 +33,9 @@ def topic_of(topics: list[dict[str, Any]], name: str) -> dict[str, Any]:
             lambda bag: change_database(bag, "UPDATE messages SET topic_id = 99 WHERE id = 1"),
             "its topics have 11 of 12 messages",
         ),
-        (
-            lambda bag: change_topics(bag, lambda each: each.remove(topic_of(each, TEXT))),
-            "its topics have 9 of 12 messages",
-        ),
-        (
-            lambda bag: change_topics(
-                bag, lambda each: topic_of(each, POINTS).update(message_count=2)
-            ),
-            "more than its index has",
-        ),
-        (
-            lambda bag: change_topics(
-                bag, lambda each: topic_of(each, POINTS).update(message_count=4)
-            ),
-            "than the 4 of its index",
-        ),
+        (lambda bag: change_metadata(bag, without_text), "its topics have 9 of 12 messages"),
+        (stating(2), "more than its index has"),
+        (stating(4), "than the 4 of its index"),
     ],
 )
 def test_a_database_with_other_messages_than_its_index_is_not_copied(

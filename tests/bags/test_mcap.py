@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mcap.reader import NonSeekingReader, make_reader
 from mcap.writer import CompressionType, IndexType, Writer
-from small_bags import tables
+from small_bags import copied, tables
 
 from benchmarks.fuzzing.false_indexes import (
     chunks_times,
@@ -21,7 +21,6 @@ from benchmarks.fuzzing.false_indexes import (
 from benchmarks.recorded_bags import POINTS, START, Ros, drive
 from derain.bags import mcap_reader
 from derain.bags.bag import Bag
-from derain.bags.bag_copy import BagCopy
 from derain.errors import InputError
 from derain.sources.folders import named_frames
 
@@ -134,12 +133,6 @@ def test_chunks_of_one_time_that_are_too_many_are_refused(tmp_path, monkeypatch)
     monkeypatch.setattr(mcap_reader, "MOST_HELD", 1000)
     with pytest.raises(InputError, match="in chunks of one time"):
         list(Bag(bag).messages())
-
-
-def copied(path: Path, out: Path) -> Path:
-    bag = Bag(path)
-    with BagCopy(bag, bag.cloud_topic(), out) as copy:
-        return copy.finish()
 
 
 def test_a_damaged_attachment_is_warned_of(tmp_path) -> None:

@@ -1,8 +1,6 @@
 """Bags without their rain: what `derain run` writes, and what it leaves as it is."""
 
 import os
-import sqlite3
-from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +8,7 @@ import pytest
 import yaml
 from contents import contents
 from numpy.typing import NDArray
-from small_bags import bag_path, small_bag, storage_file, tables
+from small_bags import bag_path, change_database, small_bag, storage_file, tables
 
 import derain
 from benchmarks.recorded_bags import (
@@ -231,9 +229,8 @@ def test_compressed_bags_are_read_and_stay_compressed(
 def test_topics_without_definition_or_hash_are_copied(tmp_path, run_derain) -> None:
     """As ROS 2 before Iron records them, in a database without definitions."""
     bag = small_bag(tmp_path, "sqlite3")
-    with closing(sqlite3.connect(storage_file(bag))) as database, database:
-        database.execute("UPDATE topics SET type_description_hash = ''")
-        database.execute("DELETE FROM message_definitions")
+    change_database(bag, "UPDATE topics SET type_description_hash = ''")
+    change_database(bag, "DELETE FROM message_definitions")
     metadata = yaml.safe_load((bag / "metadata.yaml").read_text("utf-8"))
     for topic in metadata["rosbag2_bagfile_information"]["topics_with_message_count"]:
         del topic["topic_metadata"]["type_description_hash"]
