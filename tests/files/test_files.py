@@ -140,6 +140,7 @@ def test_a_scan_is_compressed_into_the_same_bytes(tmp_path, monkeypatch) -> None
     assert first.read_bytes() == second.read_bytes()
     assert gzip.decompress(first.read_bytes()) == plain.read_bytes()
     np.testing.assert_array_equal(read_scan(first).xyz, scene(50)[:, :3])
+    np.testing.assert_array_equal(read_scan(first).intensity, scene(50)[:, 3])
 
 
 def test_members_of_a_gzip_follow_one_another_and_damage_is_refused(tmp_path) -> None:
