@@ -1,7 +1,6 @@
 """``derain info`` prints what is in a scan, labels, a model and a checkpoint."""
 
 import json
-import warnings
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
@@ -73,22 +72,15 @@ def test_a_scan_is_described_by_its_valid_points(facts_of, scan) -> None:
     }
 
 
-def test_the_text_holds_the_same_line_by_line(succeed, scan) -> None:
-    outcome = succeed("info", scan)
-    lines = outcome.out.splitlines()
-    assert lines[0] == str(scan)
-    assert "  points: 6" in lines
-    assert "  range / m: min 1.0, median 2.0, max 5.0" in lines
-    assert "  fields: x float32, y float32, z float32, intensity float32" in lines
-
-
 def test_labels_are_counted_by_class(succeed, facts_of, tmp_path) -> None:
     path = tmp_path / "scan.label"
     write_labels(path, np.array([110, 0, 110, 40]), np.array([7, 0, 8, 0]))
     facts = facts_of(path)
     assert facts["points"] == 4
     assert facts["points by class id"] == {"0": 1, "40": 1, "110": 2}
-    assert "  points by class id: 0 1, 40 1, 110 2" in succeed("info", path).out.splitlines()
+    lines = succeed("info", path).out.splitlines()
+    assert lines[0] == str(path)
+    assert "  points by class id: 0 1, 40 1, 110 2" in lines
 
 
 def test_a_model_holds_its_spec_proof_and_versions(succeed, facts_of, onnx_model) -> None:
@@ -162,12 +154,8 @@ def test_a_scan_without_a_valid_point_has_no_grid(facts_of, refused, tmp_path) -
 
 @pytest.mark.parametrize(
     ("filled", "span"),
-    [
-        ([np.nan], "none"),
-        ([np.inf, -np.inf], "none"),
-        # More than any sensor measures, so that no intensity counts; the number is still printed.
-        ([np.inf, 3e7], {"min": 3e7, "median": 3e7, "max": 3e7}),
-    ],
+    # More than any sensor measures, so that no intensity counts; the number is still printed.
+    [([np.nan], "none"), ([np.inf, 3e7], {"min": 3e7, "median": 3e7, "max": 3e7})],
 )
 def test_intensities_that_are_no_numbers_are_not_in_the_span(
     facts_of, tmp_path, filled, span
@@ -175,27 +163,17 @@ def test_intensities_that_are_no_numbers_are_not_in_the_span(
     points = scene(200)
     points[:, 3] = np.resize(filled, 200)
     points.tofile(tmp_path / "scan.bin")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", RuntimeWarning)
-        facts = facts_of(tmp_path / "scan.bin")
+    facts = facts_of(tmp_path / "scan.bin")
     assert (facts["valid"], facts["intensity"]) == (200, span)
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "reason"),
+    ("name", "reason"),
     [
-        ("weights.pt", b"12345", "holds weights without the Spec"),
-        ("cut.label", b"12345", "is not whole labels of 4 bytes"),
-        ("noise.ckpt", b"12345", "damaged"),
-        ("notes.doc", b"12345", "'.doc' is not the suffix of a scan"),
+        ("weights.pt", "holds weights without the Spec"),
+        ("cut.label", "is not whole labels of 4 bytes"),
     ],
 )
-def test_a_file_that_cannot_be_read_is_one_line_and_exit_code_2(
-    refused, tmp_path, name, content, reason
-) -> None:
-    path = tmp_path / name
-    path.write_bytes(content)
-    line = refused("info", path)
-    assert line.startswith(f"derain: {path}: ")
-    assert reason in line
-    assert line.endswith(".")
+def test_what_cannot_be_described_is_refused(refused, tmp_path, name, reason) -> None:
+    (tmp_path / name).write_bytes(b"12345")
+    assert reason in refused("info", tmp_path / name)
