@@ -1,13 +1,10 @@
 """LiSnowNet's network computes what was published, for images of any size and content."""
 
 import json
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
 import torch
-from hypothesis import given
-from hypothesis import strategies as st
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from torch import Tensor, nn
@@ -45,47 +42,32 @@ def scene(height: int, width: int, share: float = 0.7, scans: int = 1) -> tuple[
     return image, torch.rand(scans, 1, height, width, generator=generator) < share
 
 
-def hard_images(height: int, width: int) -> Iterator[tuple[str, Tensor, Tensor]]:
-    """Images that break networks."""
-    image, valid = scene(height, width)
-    nothing, everything = torch.zeros_like(valid), torch.ones_like(valid)
-    one_return = nothing.clone()
-    one_return[..., 7, 0] = True
-    empty_rows = valid.clone()
-    empty_rows[..., 5:12, :] = False
-    yield "ordinary", image, valid
-    yield "empty", image, nothing
-    yield "NaN where empty", torch.where(valid, image, torch.nan), valid
-    yield "one return", image, one_return
-    yield "empty rows", image, empty_rows
-    yield "one hole", image, ~one_return
-    yield "constant with holes", torch.full_like(image, 2.5), valid
-    yield "constant", torch.full_like(image, 2.5), everything
-    yield "constant but for one hole", torch.full_like(image, 2.5), ~one_return
-    yield "next to constant", 2.5 + 1e-4 * image, everything
-    yield "zero", torch.zeros_like(image), everything
-    yield "10 km", torch.full_like(image, 1e4 ** (1 / 3)), valid
+IMAGE, VALID = scene(32, 48)
+CONSTANT, EVERYTHING = torch.full_like(IMAGE, 2.5), torch.ones_like(VALID)
+ONE_RETURN = torch.zeros_like(VALID)
+ONE_RETURN[..., 7, 0] = True
 
-
-# Of a size that fits the halvings, where a constant image stays constant, and of one that does not.
-FITTING = {name: (image, valid) for name, image, valid in hard_images(32, 48)}
+# Images of next to no variation, which BatchNorm divides by. They are of a size that fits the
+# halvings, where a constant image stays constant.
+FLAT = {
+    "one return": (IMAGE, ONE_RETURN),
+    "constant with holes": (CONSTANT, VALID),
+    "constant but for one hole": (CONSTANT, ~ONE_RETURN),
+    "next to constant": (2.5 + 1e-4 * IMAGE, EVERYTHING),
+    "zero": (torch.zeros_like(IMAGE), EVERYTHING),
+}
 
 
 @torch.no_grad()
 def test_the_image_is_that_of_the_published_network(shared) -> None:
     oracle = np.load(shared / "oracles" / "lisnownet.npz")
     shapes = json.loads((shared / "oracles" / "shapes.json").read_text())["lisnownet"]
-    assert sorted(published(LiSnowNetwork())) == list(oracle["keys"])
+    ours = published(LiSnowNetwork()).items()
+    assert {key: list(tensor.shape) for key, tensor in ours} == shapes
     network = LiSnowNetwork.from_published(recipe_weights(shapes, int(oracle["seed"]))).eval()
     image = torch.from_numpy(oracle["x"])
     denoised = network(image, (image >= 0).any(dim=1, keepdim=True))
     np.testing.assert_allclose(denoised, oracle["y"], rtol=0, atol=1e-4)
-
-
-def test_it_has_as_many_parameters_and_tensors_as_published() -> None:
-    network = LiSnowNetwork()
-    assert sum(parameter.numel() for parameter in network.parameters()) == 1_462_450
-    assert len(network.state_dict()) == 272
 
 
 @pytest.mark.parametrize(("channels", "width"), [(2, 4), (3, 2), (1, 1)])
@@ -100,24 +82,15 @@ def test_its_size_is_read_from_published_weights(channels, width) -> None:
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
-        ({"dec0.2.bias": None}, "1 keys missing"),
-        ({"another.weight": torch.zeros(3)}, "another.weight"),
         ({"enc2.1.shortcut.conv.weight": torch.zeros(4, 4, 3, 3)}, "encoder.2.1.shortcut"),
         ({"dec0.2.bias": torch.zeros(0)}, "at least 1"),
+        ({"dec0.0.main_block.0.bn.bias": torch.zeros(0)}, "at least 1"),
         ({"dec0.2.bias": torch.zeros(3)}, "another network"),
     ],
 )
 def test_weights_of_another_network_are_refused(change, reason) -> None:
-    tensors = {**published(small()), **change}
-    state_dict = {key: tensor for key, tensor in tensors.items() if tensor is not None}
     with pytest.raises(InputError, match=reason):
-        LiSnowNetwork.from_published(state_dict)
-
-
-@pytest.mark.parametrize("size", [{"width": 0}, {"channels": 0}, {"width": -8}])
-def test_a_network_without_channels_is_refused(size) -> None:
-    with pytest.raises(InputError, match="at least 1"):
-        LiSnowNetwork(**size)
+        LiSnowNetwork.from_published({**published(small()), **change})
 
 
 @pytest.mark.parametrize(
@@ -150,10 +123,10 @@ def test_channels_are_dropped_in_training_alone() -> None:
     assert torch.equal(network(*seen), network(*seen))
 
 
-@pytest.mark.parametrize("case", FITTING)
+@pytest.mark.parametrize("case", FLAT)
 @pytest.mark.parametrize("bfloat16", [False, True], ids=["float32", "bfloat16"])
-def test_a_training_step_on_a_hard_image_is_small(case, bfloat16) -> None:
-    network, (image, valid) = small().train(), FITTING[case]
+def test_a_training_step_on_a_flat_image_is_small(case, bfloat16) -> None:
+    network, (image, valid) = small().train(), FLAT[case]
     with torch.autocast("cpu", dtype=torch.bfloat16, enabled=bfloat16):
         denoised = network(image, valid)
         loss = sparsity_loss(denoised, image, valid, alpha=5, beta=0.5)
@@ -165,13 +138,11 @@ def test_a_training_step_on_a_hard_image_is_small(case, bfloat16) -> None:
 
 
 def test_an_image_without_variation_leaves_the_others_their_gradient() -> None:
-    network, (image, valid) = small(), scene(32, 48)
-    constant, everything = torch.full_like(image, 2.5), torch.ones_like(valid)
-    gradients = []
+    network, gradients = small(), []
     for images, valids in [
-        ([image], [valid]),
-        ([image, constant], [valid, everything]),
-        ([constant, image], [everything, valid]),
+        ([IMAGE], [VALID]),
+        ([IMAGE, CONSTANT], [VALID, EVERYTHING]),
+        ([CONSTANT, IMAGE], [EVERYTHING, VALID]),
     ]:
         # In evaluation mode scans do not see each other, and yet the step is a training one.
         network.zero_grad()
@@ -189,22 +160,7 @@ def test_the_gradient_reaches_every_parameter() -> None:
         assert parameter.grad.any(), name
 
 
-@st.composite
-def images(draw: st.DrawFn) -> Tensor:
-    scans, channels, rows, columns = (draw(st.integers(1, top)) for top in (2, 3, 5, 5))
-    generator = torch.Generator().manual_seed(draw(st.integers(0, 2**32)))
-    shape = (scans, channels, 2 * rows, 2 * columns)
-    return torch.randn(shape, generator=generator, dtype=torch.float64)
-
-
-@given(images())
-def test_each_is_the_inverse_of_the_other(image) -> None:
-    bands = haar(image)
-    torch.testing.assert_close(inverse_haar(bands), image)
-    torch.testing.assert_close(haar(inverse_haar(bands)), bands)
-
-
-def test_each_block_is_multiplied_by_the_basis() -> None:
+def test_each_block_is_multiplied_by_the_basis_which_is_its_own_inverse() -> None:
     basis = np.array([[1, 1, 1, 1], [1, 1, -1, -1], [1, -1, 1, -1], [1, -1, -1, 1]]) / 2
     image = torch.randn(2, 3, 6, 10, dtype=torch.float64)
     bands = haar(image).unflatten(1, (4, 3)).numpy()
@@ -212,6 +168,7 @@ def test_each_block_is_multiplied_by_the_basis() -> None:
         block = image[..., 2 * row : 2 * row + 2, 2 * column : 2 * column + 2].flatten(-2).numpy()
         expected = np.einsum("bp,scp->sbc", basis, block)
         np.testing.assert_allclose(bands[..., row, column], expected)
+    torch.testing.assert_close(inverse_haar(haar(image)), image)
 
 
 def neighbourhoods(image: NDArray[np.float64], size: int) -> NDArray[np.float64]:
@@ -234,13 +191,6 @@ def as_published(image: NDArray[np.float64]) -> NDArray[np.float64]:
     around = neighbourhoods(dense, 3).sum(axis=(3, 4)) - dense
     sharpened = dense + np.maximum(around / 8 - dense, 0)
     return np.where(valid, image, neighbourhoods(sharpened, 5).mean(axis=(3, 4)))
-
-
-def test_the_filled_image_is_the_published_one(shared) -> None:
-    oracle = np.load(shared / "oracles" / "lisnownet.npz")
-    image = torch.from_numpy(oracle["x"])
-    filled = fill_holes(image, (image >= 0).any(dim=1, keepdim=True))
-    np.testing.assert_allclose(filled, oracle["filled"], rtol=0, atol=1e-5)
 
 
 @pytest.mark.parametrize(("height", "width"), [(3, 2), (4, 7), (16, 64)])
@@ -289,19 +239,10 @@ def test_a_single_return_fills_the_whole_image() -> None:
 
 
 @pytest.mark.parametrize("share", [0.0, 0.01, 0.3, 1.0])
-@pytest.mark.parametrize("value", [None, 0.0, 2.7])
-def test_gradients_are_finite(share, value) -> None:
+@pytest.mark.parametrize("largest", [0.0, 1e-38, 1e4, 3e38])
+def test_ranges_of_every_size_stay_finite(share, largest) -> None:
     image, valid = scene(16, 32, share)
-    image = image if value is None else torch.full_like(image, value)
     valid[..., 3:10, :] = False
-    image.requires_grad_()
-    fill_holes(image, valid).square().sum().backward()
-    assert image.grad.isfinite().all()
-
-
-@pytest.mark.parametrize("largest", [1e-38, 1e4, 3e38])
-def test_ranges_of_every_size_stay_finite(largest) -> None:
-    image, valid = scene(16, 32, 0.3)
     image = (image / 4 * largest) ** (1 / 3)
     image.requires_grad_()
     filled = fill_holes(image, valid)

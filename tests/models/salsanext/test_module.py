@@ -12,17 +12,14 @@ from derain.evaluation.hard_cases import scene
 from derain.learning.batch import Batch
 from derain.learning.losses import segmentation_loss
 from derain.models.salsanext import SalsaNext
-from derain.models.salsanext.network import PUBLISHED_KEYS, SalsaNextNetwork
+from derain.models.salsanext.network import SalsaNextNetwork
 from derain.views.probability import probability_of_rain
 from derain.views.spherical_grid import grid_of
 from derain.views.view import IGNORED
 
+from .test_network import published
+
 WADS = load_card("wads")
-
-
-def published(network: SalsaNextNetwork) -> dict[str, Tensor]:
-    """The network's tensors under the published keys."""
-    return {PUBLISHED_KEYS[name]: tensor for name, tensor in network.state_dict().items()}
 
 
 def test_the_spec_holds_how_the_network_is_used() -> None:
@@ -38,14 +35,12 @@ def test_the_spec_holds_how_the_network_is_used() -> None:
     assert (spec.classes, spec.rain) == (WADS.classes, (110,))
 
 
-@pytest.mark.parametrize("prefix", ["", "module."])
 @torch.no_grad()
 def test_published_weights_give_the_logits_of_the_network_on_normalised_images(
-    image_network, sample, small_grid, prefix
+    image_network, sample
 ) -> None:
     network = image_network(SalsaNext).network
-    weights = {prefix + key: tensor for key, tensor in published(network).items()}
-    model = SalsaNext.from_published(weights, WADS, "semantickitti").eval()
+    model = SalsaNext.from_published(published(network), WADS, "semantickitti").eval()
     assert (model.spec.data, model.hparams["width"]) == ("WADS", 4)
     assert model.spec.view["grid"] == grid_of("semantickitti", "").as_dict()
     inputs = Batch.of([sample(image_network(SalsaNext), scene())]).inputs
