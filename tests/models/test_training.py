@@ -11,7 +11,6 @@ from lightning.pytorch.callbacks import ModelCheckpoint
 from numpy.typing import NDArray
 
 from derain.datamodules.augmentation import Augmentation
-from derain.errors import InputError
 from derain.files.labels import write_labels
 from derain.learning.batch import Batch
 from derain.learning.losses import class_weights
@@ -155,13 +154,3 @@ def test_a_network_of_candidates_learns_from_them_and_judges_them_alone(
     assert scores["test/iou"] == pytest.approx(iou(probability > model.spec.threshold, rain))
     trainer.save_checkpoint(tmp_path / "run.ckpt")
     assert load_model(tmp_path / "run.ckpt").spec == model.spec
-
-
-@pytest.mark.parametrize("content", [{}, {"hyper_parameters": {"lr": 1}}], ids=str)
-def test_a_run_does_not_start_from_a_checkpoint_of_something_else(
-    make_trainer, scenes, tmp_path, content
-) -> None:
-    foreign = {"pytorch-lightning_version": lightning.__version__, "state_dict": {}, **content}
-    torch.save(foreign, tmp_path / "foreign.ckpt")
-    with pytest.raises(InputError, match="it has no Spec"):
-        make_trainer(epochs=1).test(OutDet(), scenes(), ckpt_path=tmp_path / "foreign.ckpt")

@@ -8,6 +8,7 @@ from typing import Any
 import lightning
 import pytest
 import torch
+from contents import contents
 from lightning.pytorch.callbacks import ModelCheckpoint
 from torch import Tensor
 
@@ -74,10 +75,6 @@ def weights(folder: Path) -> dict[str, float]:
         for path in folder.glob("*.ckpt")
         if path.name != "last.ckpt"
     }
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in folder.glob("*.ckpt")}
 
 
 @pytest.mark.parametrize(
