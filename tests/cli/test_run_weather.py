@@ -173,15 +173,22 @@ def test_scans_that_are_no_recording_have_levels_and_no_alarm(
     assert outcome.code == 3  # by the scans alone
 
 
-def test_a_table_takes_the_place_of_no_result(refused, recording, tmp_path) -> None:
-    for name in ("out/000003.bin", "out/000003.label", "rain/000003.bin"):
-        folders = ("--out", tmp_path / "out", "--removed", tmp_path / "rain")
-        line = refused("run", "dror", recording, *folders, "--weather", tmp_path / name)
-        assert f"{tmp_path / name}: " in line
+def test_a_table_takes_the_place_of_no_result_and_of_no_other_file(
+    refused, recording, tmp_path
+) -> None:
+    scan = recording / "000003.bin"
+    before = scan.read_bytes()
+    folders = ("--out", tmp_path / "out", "--removed", tmp_path / "rain")
+    results = ("out/000003.bin", "out/000003.label", "rain/000003.bin")
+    for path in (scan, *(tmp_path / name for name in results)):
+        assert f"{path}: " in refused("run", "dror", recording, *folders, "--weather", path)
+    assert scan.read_bytes() == before
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_run_that_fails_leaves_the_longer_table(tmp_path) -> None:
     table = tmp_path / "weather.csv"
+    table.touch()
     for rows, expected in ((3, 3), (2, 3), (4, 4)):
         with suppress(KeyboardInterrupt), weather_table(table, []) as lines:
             lines.extend([number] for number in range(rows))
@@ -190,24 +197,6 @@ def test_a_run_that_fails_leaves_the_longer_table(tmp_path) -> None:
     with weather_table(table, []) as lines:
         lines.append([0])
     assert len(table.read_text().splitlines()) == 2
-
-
-def test_a_table_takes_the_place_of_no_other_file(refused, recording, tmp_path) -> None:
-    scan = recording / "000003.bin"
-    before = scan.read_bytes()
-    line = refused("run", "dror", recording, "--out", tmp_path / "out", "--weather", scan)
-    assert f"{scan}: exists, and is not a table of the weather" in line
-    assert scan.read_bytes() == before
-    assert not (tmp_path / "out").exists()
-
-
-def test_the_table_of_an_earlier_run_is_replaced(succeed, recording, tmp_path) -> None:
-    table = tmp_path / "out/weather.csv"
-    (tmp_path / "out").mkdir()
-    table.touch()
-    for scans in (recording, recording / "000000.bin"):
-        succeed("run", "dror", scans, "--out", tmp_path / "out", "--weather", table)
-    assert len(table.read_text().splitlines()) == 1 + 1
 
 
 def test_a_reader_that_has_had_enough_leaves_whole_results_and_their_table(

@@ -103,14 +103,6 @@ def test_in_eight_bits_nothing_leaves_the_integers_between_image_and_scores(
     assert not run.keys() & {"Conv", "FusedConv", "Relu", "Add", "Concat"}
 
 
-def test_in_eight_bits_the_file_is_smaller(int8, image_onnx) -> None:
-    stored, before = (
-        sum(tensor.ByteSize() for tensor in onnx.load(path).graph.initializer)
-        for path in (int8[0], image_onnx)
-    )
-    assert stored < 0.5 * before
-
-
 def test_the_proof_is_made_on_the_calibration_scans_and_on_every_hard_case(int8) -> None:
     path, proof = int8
     assert proof.holds

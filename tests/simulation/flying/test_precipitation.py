@@ -64,7 +64,6 @@ def test_what_a_document_leaves_out_stays_as_it_is() -> None:
         ({"snow": {"number": [2, 1]}}, "number"),
         ({"snow": {"number": [0, 1]}}, "number"),
         ({"snow": {"number": [1, 1e10]}}, "number"),
-        ({"snow": {"reflectivity": [0.5, 1.5]}}, "reflectivity"),
         ({"snow": {"haze_chance": 2}}, "haze_chance"),
         ({"snow": {"weight": -1}}, "weight"),
         ({"snow": {"weight": 0}}, "weight"),
