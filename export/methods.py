@@ -186,7 +186,7 @@ def require_one_scan(method: Method) -> None:
         raise InputError(
             method.as_dict()["method"],
             "sees the scans around the one that it judges, which this command does not provide",
-            "Use `derain run`, `derain teach` or `derain test`, which take recordings whole.",
+            "Use `derain run`, or `derain teach --card`, which compares its answers with labels.",
         )
 
 
