@@ -21,7 +21,7 @@ Points = NDArray[np.float32]  # (N, 4): x, y, z in metres, sensor frame; intensi
 Spec = dict[str, Any]
 
 LARGEST_COORDINATE, LARGEST_VALUE, SENTINEL, FEWEST_ALIKE = 1e6, 1e7, -1.0, 100
-MOST_COPIES = 50
+MOST_COPIES = 20
 
 # Steps within 5 × 5 pixels: to the pixel itself, then the nearest, then row by row.
 STEPS = sorted(

@@ -14,9 +14,9 @@ from derain.scan import Scan
 BITS_PER_AXIS = 16
 
 # Rows at one position are copies of one point, up to this many. More are rays without a return,
-# which were at the origin until they were moved with their frame.
+# which were at the origin until they were moved with their frame, perhaps column by column.
 # Source: modelling choice; a converter writes a return a few times at most.
-MOST_COPIES = 50
+MOST_COPIES = 20
 
 
 def _spread(values: NDArray[np.uint64]) -> NDArray[np.uint64]:

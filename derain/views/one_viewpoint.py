@@ -29,7 +29,7 @@ SAMPLED = 1024
 # More sampled points at one position, to the bit, are rays without a return, which were at the
 # origin until they were moved with their frame. In the scans that were looked at no two share a
 # position, and of returns that are written twice or four times hardly any are sampled twice.
-MOST_AT_ONE_POSITION = SAMPLED // 50
+MOST_AT_ONE_POSITION = MOST_COPIES
 
 # Points lie this many times farther off than from one another: the sensor is not at the origin. A
 # sensor that sees no more than 11 degrees of a wall would come as near.
@@ -142,11 +142,11 @@ def _no_returns_issue(scan: Scan, position: NDArray[np.float64]) -> ScanIssue:
     """The issue of a scan with many points at one position, float64 (3,)."""
     number = np.count_nonzero((scan.xyz == position).all(axis=1))
     x, y, z = position
-    judged = "" if number <= MOST_COPIES else " (only networks of range images judge such points)"
     return ScanIssue(
         "many points at one position",
         f"{number:,} points lie at ({x:g}, {y:g}, {z:g}) m, as rays without a return do in a frame "
-        f"that is not the sensor's: leave them out, or judge scans before they are moved{judged}",
+        "that is not the sensor's: leave them out, or judge scans before they are moved (only "
+        "networks of range images judge such points)",
     )
 
 

@@ -18,7 +18,7 @@
 namespace derain {
 
 // More rows at one position are rays without a return, as in derain/views/morton.py.
-constexpr std::ptrdiff_t kMostCopies = 50;
+constexpr std::ptrdiff_t kMostCopies = 20;
 
 // M points, of F of which there are neighbourhoods of k. Without candidates F = M, and each point
 // is scored; with them, J are, and `candidates` holds where the neighbourhoods lie that they need.

@@ -11,6 +11,14 @@ from derain.evaluation.hard_cases import scene
 from derain.filters import DROR, DSOR, ROR, SOR, SSR, FilterDerainer, PointFilter, filter_view
 from derain.filters.radius_filters import has_few_neighbours
 from derain.scan import Scan
+from derain.views.morton import MOST_COPIES
+
+
+def with_few_copies(cloud: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The rows of a cloud but those of which there are more than copies of one point."""
+    _, place, times = np.unique(cloud[:, :3], axis=0, return_inverse=True, return_counts=True)
+    return cloud[times[place.reshape(-1)] <= MOST_COPIES]
+
 
 # Few values on a coarse grid: copies, equal distances, points at the origin, radii that are met
 # exactly. Few points: neighbourhoods larger than the scan.
@@ -18,12 +26,12 @@ gridded = hnp.arrays(
     np.float32,
     st.tuples(st.integers(0, 25), st.just(4)),
     elements=st.integers(-6, 6).map(lambda value: value / 2),
-)
+).map(with_few_copies)
 scattered = hnp.arrays(
     np.float32,
     st.tuples(st.integers(0, 60), st.just(4)),
     elements=st.floats(-20, 20, width=32).map(lambda value: round(value, 3)),
-)
+).map(with_few_copies)
 clouds = st.one_of(gridded, scattered)
 counts = st.integers(2, 12)
 

@@ -60,7 +60,7 @@ def test_the_answer_does_not_depend_on_the_order_inside(xyz, random) -> None:
     np.testing.assert_array_equal(shuffle[shuffled], neighbours[shuffle])
 
 
-@given(gridded, st.randoms(use_true_random=False))
+@given(gridded.map(lambda xyz: xyz[:20]), st.randoms(use_true_random=False))
 def test_distinct_rows_are_those_of_the_rows_that_can_be_judged(xyz, random) -> None:
     lost = np.array([random.random() < 0.3 for _ in xyz], bool)
     scan = Scan(np.where(lost[:, None], np.float32(np.nan), xyz))
@@ -77,9 +77,10 @@ def test_distinct_rows_are_those_of_the_rows_that_can_be_judged(xyz, random) -> 
 @given(gridded, st.randoms(use_true_random=False))
 def test_a_position_of_more_rows_than_copies_is_no_point(xyz, random) -> None:
     place = np.float32([[9, 0, 1]])
-    some, many = (np.vstack([xyz, np.repeat(place, n, axis=0)]) for n in (50, 51))
+    xyz = np.unique(xyz, axis=0)
+    some, many = (np.vstack([xyz, np.repeat(place, n, axis=0)]) for n in (20, 21))
     order = random.sample(range(len(many)), len(many))
-    assert (distinct_rows(Scan(some))[1] >= 0).sum() == Scan(xyz).valid.sum() + 50
+    assert (distinct_rows(Scan(some))[1] >= 0).sum() == Scan(xyz).valid.sum() + 20
     first, inverse = distinct_rows(Scan(many[order]))
     at_place = (many[order] == place).all(axis=1)
     np.testing.assert_array_equal(inverse < 0, ~Scan(many[order]).valid | at_place)
