@@ -191,19 +191,14 @@ def neighbour_view(points: Points, spec: Spec) -> tuple[dict[str, NDArray[Any]],
 def distinct_points(points: Points) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Rows of the distinct positions along the curve, and of each row its position's number."""
     rows = along_the_curve(points, np.flatnonzero(valid_rows(points)))
-    position = np.cumsum(is_elsewhere(points, rows)) - 1
-    rows = rows[np.bincount(position)[position] <= MOST_COPIES]
-    elsewhere = is_elsewhere(points, rows)
+    elsewhere = np.ones(len(rows), bool)
+    elsewhere[1:] = (points[rows[1:], :3] != points[rows[:-1], :3]).any(axis=1)
+    position = np.cumsum(elsewhere) - 1
+    are_copies = np.bincount(position)[position] <= MOST_COPIES
+    rows, elsewhere = rows[are_copies], elsewhere[are_copies]
     first, inverse = rows[elsewhere], np.full(len(points), -1)
     inverse[rows] = np.cumsum(elsewhere) - 1
     return first, inverse
-
-
-def is_elsewhere(points: Points, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """True for each of the rows that is not at the position of the one before it."""
-    elsewhere = np.ones(len(rows), bool)
-    elsewhere[1:] = (points[rows[1:], :3] != points[rows[:-1], :3]).any(axis=1)
-    return elsewhere
 
 
 def along_the_curve(points: Points, rows: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -26,11 +26,6 @@ LEAST_VALID = 0.01
 # Number of points, spread over all, for the checks of positions and units.
 SAMPLED = 1024
 
-# More sampled points at one position, to the bit, are rays without a return, which were at the
-# origin until they were moved with their frame. In the scans that were looked at no two share a
-# position, and of returns that are written twice or four times hardly any are sampled twice.
-MOST_AT_ONE_POSITION = MOST_COPIES
-
 # Points lie this many times farther off than from one another: the sensor is not at the origin. A
 # sensor that sees no more than 11 degrees of a wall would come as near.
 OFF_CENTRE = 10.0
@@ -110,7 +105,7 @@ def viewpoint_issues(scan: Scan) -> Iterator[ScanIssue]:
         return
     sample = scan.xyz.take(rows[:: -(-len(rows) // SAMPLED)], axis=0).astype(np.float64)
     position, times = _commonest(sample)
-    if times > MOST_AT_ONE_POSITION:
+    if times > MOST_COPIES:
         yield _no_returns_issue(scan, position)
         others = sample[(sample != position).any(axis=1)]
         sample = others if len(others) else sample
