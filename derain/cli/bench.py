@@ -30,24 +30,24 @@ import argparse
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from derain.cli import unit_options
 from derain.cli.method_options import add_runtime, list_methods, runtime_of
 from derain.cli.options import add_data, add_threads, command_line, count, labelled
 from derain.cli.outputs import print_lines
 from derain.cli.parser import Parser
+from derain.datamodules.labelled import LabelledScans, rain_rates
+from derain.datamodules.scan_data import Part
 from derain.errors import InputError
 from derain.evaluation.published_tables import TABLES, paper_table, scans_by_group
+from derain.export.bench.bench import Bench, Effort, count_in_units, run_bench
+from derain.export.bench.bench_entries import bench_entries
+from derain.export.bench.labelled_frames import LabelledFrames
+from derain.export.bench.report import with_published_rows
 from derain.files.atomic import require_writable, write_text
 from derain.sources.frame import Frame
 from derain.sources.source import Frames
 from derain.sources.spread import evenly_spaced
-
-if TYPE_CHECKING:
-    from derain.datamodules.labelled import LabelledScans
-    from derain.datamodules.scan_data import Part
-    from derain.export.bench.bench import Bench
 
 
 def add_arguments(parser: Parser) -> None:
@@ -91,12 +91,6 @@ def add_arguments(parser: Parser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    from derain.datamodules.labelled import rain_rates
-    from derain.export.bench.bench import Effort, count_in_units, run_bench
-    from derain.export.bench.bench_entries import bench_entries
-    from derain.export.bench.labelled_frames import LabelledFrames
-    from derain.export.bench.report import with_published_rows
-
     topic, distinct = arguments.topic, arguments.distinct
     data = labelled(arguments.data, arguments, topic, distinct)
     training = data
@@ -104,7 +98,7 @@ def main(arguments: argparse.Namespace) -> int:
         training = labelled(arguments.train, arguments, topic, distinct)
     rates = rain_rates(arguments.data, arguments.rain_rates)
 
-    def labelled_frames(scans: "LabelledScans", frames: Sequence[Frame]) -> LabelledFrames:
+    def labelled_frames(scans: LabelledScans, frames: Sequence[Frame]) -> LabelledFrames:
         scale = scans.loading.intensity_scale
         return LabelledFrames(scans.card, frames, scale, scans.distinct, rates)
 
@@ -123,7 +117,7 @@ def main(arguments: argparse.Namespace) -> int:
     command = command_line(arguments, without=unit_options.UNIT_OPTIONS)
     unit_options.share_threads(arguments, workers)
 
-    def bench(frames: Sequence[Frame], out: Path) -> "Bench | None":
+    def bench(frames: Sequence[Frame], out: Path) -> Bench | None:
         """Benches the methods on some of the scans, and writes tables and picture.
 
         Returns None while other shards are to be scored.
@@ -159,6 +153,6 @@ def main(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _frames(data: "LabelledScans", part: "Part") -> Frames:
+def _frames(data: LabelledScans, part: Part) -> Frames:
     """The scans of a part; one that is named twice is one."""
     return Frames({frame.name: frame for frame in data.frames(part)}.values())

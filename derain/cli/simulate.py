@@ -49,7 +49,7 @@ Simulated rain is easy: a score on it does not predict the score on real rain.
 import argparse
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from tqdm import tqdm
@@ -59,18 +59,21 @@ from derain.cli.options import add_columns, count
 from derain.cli.unit_options import add_executor, add_shard, executor_of, shard_of
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS
+from derain.scan import Scan
+from derain.simulation.campaign import FACILITY_RAIN_RATES, Campaign, Drive, partition
 from derain.simulation.classes import TrackClass
+from derain.simulation.dataset import simulate_track
+from derain.simulation.radar import Radar
+from derain.simulation.rain_field import UniformRain
+from derain.simulation.recorded import rain_on_scan
+from derain.simulation.sensor import load_sensor
+from derain.simulation.world import WorldCampaign
 from derain.sources.folders import named_frames
 from derain.sources.judging import Failures
 from derain.system.cores import usable_cores
 from derain.system.extras import MATPLOTLIB, OPEN3D, require
 
-if TYPE_CHECKING:
-    from derain.scan import Scan
-    from derain.simulation.campaign import Campaign
-    from derain.simulation.world import WorldCampaign
-
-# The names of derain.simulation.layouts, which takes too long to import where it is not used.
+# The names of derain.simulation.layouts, that of the default first.
 LAYOUT_NAMES = ("facility", "street", "city", "country", "motorway", "garage", "yard", "room")
 
 # Options of a data set, and what each is where it is not given.
@@ -169,8 +172,6 @@ def main(arguments: argparse.Namespace) -> int:
         _refuse((*DATA_SET_DEFAULTS, "world"), arguments, needs="without --on")
         return _rain_on_scans(arguments)
     require("simulate", OPEN3D)
-    from derain.simulation.dataset import simulate_track
-
     in_world = arguments.world is not None
     if in_world:
         foreign = (*OF_NO_WORLD, *SCAN_OPTIONS, "rain", "sensor")
@@ -201,12 +202,8 @@ def _refuse(foreign: Iterable[str], arguments: argparse.Namespace, needs: str) -
             raise InputError(f"--{name}", f"works only {needs}", "Leave it out.")
 
 
-def _campaign(options: argparse.Namespace) -> "Campaign | WorldCampaign":
+def _campaign(options: argparse.Namespace) -> Campaign | WorldCampaign:
     """The campaign to simulate: sequences of tracks, or scans of worlds."""
-    from derain.simulation.campaign import FACILITY_RAIN_RATES, Campaign, Drive, partition
-    from derain.simulation.radar import Radar
-    from derain.simulation.world import WorldCampaign
-
     if options.world is not None:
         return WorldCampaign(*partition(options.sequences), seed=options.seed, world=options.world)
     moves = options.speed, options.traffic, options.skew
@@ -228,9 +225,6 @@ def _rain_on_scans(arguments: argparse.Namespace) -> int:
     if arguments.picture:
         require("--picture", MATPLOTLIB)
         from derain.pictures.scan_pictures import before_after_figure, save
-    from derain.simulation.rain_field import UniformRain
-    from derain.simulation.recorded import rain_on_scan
-    from derain.simulation.sensor import load_sensor
 
     if not arguments.rain or len(arguments.rain) > 1:
         raise InputError("--rain", "scans take a single rain rate", "Give one, e.g. --rain 25.")
@@ -256,7 +250,7 @@ def _rain_on_scans(arguments: argparse.Namespace) -> int:
     return outputs.exit_code(len(failures.errors), len(source), "no rain could be added to {scans}")
 
 
-def _print_rain(name: str, clean: "Scan", rainy: "Scan", drops: int, as_json: bool) -> None:
+def _print_rain(name: str, clean: Scan, rainy: Scan, drops: int, as_json: bool) -> None:
     """Prints the valid points of a scan before and after, how many are drops, and how many lost."""
     before, after = int(clean.valid.sum()), int(rainy.valid.sum())
     lost = before - (after - drops)

@@ -27,8 +27,8 @@ the record only: they do not change the result.
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from derain.annotation.teach import LabelledScan, refuse_to_overwrite
 from derain.cards.card import load_card, packaged_cards
 from derain.cards.known import layouts_for
 from derain.cli import options, unit_options
@@ -41,9 +41,7 @@ from derain.export.methods import over_recording
 from derain.sources.folders import named_frames
 from derain.sources.judging import Failures
 from derain.stores.url import paths_of
-
-if TYPE_CHECKING:
-    from derain.annotation.teach import LabelledScan
+from derain.workflows.teaching import teach_recordings
 
 
 def add_arguments(parser: Parser) -> None:
@@ -65,9 +63,6 @@ def add_arguments(parser: Parser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    from derain.annotation.teach import refuse_to_overwrite
-    from derain.workflows.teaching import teach_recordings
-
     division = unit_options.division_of(arguments)
     name, scans = method_and_scans(arguments.method, arguments.scans or [], "teach", "taught")
     method = over_recording(method_of(name, arguments))
@@ -113,7 +108,7 @@ def main(arguments: argparse.Namespace) -> int:
     return exit_code(failed, len(source), "{scans} could not be judged, and have no labels")
 
 
-def _print_labels(scan: "LabelledScan", as_json: bool) -> None:
+def _print_labels(scan: LabelledScan, as_json: bool) -> None:
     not_rain, rain, not_known = map(or_none, scan.answers.shares.tolist())
     facts = {
         "scan": scan.frame.name,
