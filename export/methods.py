@@ -1,7 +1,7 @@
 """A method by the name that a user gives it: a model, a filter, or one that sees several scans."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -80,6 +80,18 @@ def split_title(text: str) -> tuple[str, str]:
     if not equals or os.path.isfile(text):  # files may well have an equals sign in their names
         title, name = Path(text).stem, text
     return printable(title), name  # the title goes into tables and pictures
+
+
+def refuse_same_titles(titles: Sequence[str]) -> None:
+    """Refuses methods of which two have one title.
+
+    Raises:
+        InputError: There are such methods.
+    """
+    for title in titles:
+        if titles.count(title) > 1:
+            remedy = "Give titles, as in `first=a.onnx second=dror`."
+            raise InputError(title, "it is the title of two methods", remedy)
 
 
 def method_names() -> list[str]:

@@ -236,16 +236,11 @@ def card_as_text(card: ModelCard, size: int) -> str:
     lines = [f"{card.title}, {size:,} bytes"]
     for heading, paragraphs in parts.items():
         lines.append(f"  {heading}:")
-        lines += [line for paragraph in paragraphs for line in _wrapped(paragraph)]
+        for paragraph in paragraphs:
+            lines += wrap(paragraph, LINE_LENGTH, initial_indent=" " * 4, subsequent_indent=" " * 6)
         if heading == "how good it is":
             lines.append(_scores(card.scores))
     return "\n".join(lines)
-
-
-def _wrapped(paragraph: str) -> list[str]:
-    """Lines of a paragraph, those after the first set in."""
-    start, hanging = "    ", "      "
-    return wrap(paragraph, LINE_LENGTH, initial_indent=start, subsequent_indent=hanging)
 
 
 def _scores(scores: Sequence[ModelScore]) -> str:

@@ -1,8 +1,8 @@
 """Options of commands that divide their work into units: processes, machines, and records."""
 
 import argparse
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 
 from derain.cli.options import count
 from derain.errors import InputError
@@ -190,8 +190,9 @@ def method_and_workers(
     return (remake() if share_threads(arguments, workers) else method), workers
 
 
-@contextmanager
-def executor_of(arguments: argparse.Namespace, workers: int) -> Iterator[Submits | None]:
+def executor_of(
+    arguments: argparse.Namespace, workers: int
+) -> AbstractContextManager[Submits | None]:
     """Lends the processes that do the work; None where this process does it.
 
     Args:
@@ -201,13 +202,10 @@ def executor_of(arguments: argparse.Namespace, workers: int) -> Iterator[Submits
     Raises:
         InputError: Options that exclude each other, or a cluster that cannot do the work.
     """
-    if arguments.dask is not None:
-        if arguments.workers is not None:
-            raise InputError("--workers", "excludes --dask", "Leave one of them out.")
-        from derain.jobs.cluster import dask_executor  # imports Dask
+    if arguments.dask is None:
+        return processes(workers)
+    if arguments.workers is not None:
+        raise InputError("--workers", "excludes --dask", "Leave one of them out.")
+    from derain.jobs.cluster import dask_executor  # imports Dask
 
-        with dask_executor(arguments.dask) as cluster:
-            yield cluster
-    else:
-        with processes(workers) as pool:
-            yield pool
+    return dask_executor(arguments.dask)

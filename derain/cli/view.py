@@ -45,6 +45,7 @@ from derain.export.methods import (
     load_method,
     load_method_of_one_scan,
     named_method,
+    refuse_same_titles,
     split_title,
 )
 from derain.sources.bag_frame import NUMBER, BagFrame
@@ -168,15 +169,9 @@ def _names_by_title(methods: Sequence[str]) -> dict[str, str]:
     Raises:
         InputError: Two methods of one title.
     """
-    names: dict[str, str] = {}
-    for text in methods:
-        title, name = split_title(text)
-        if title in names:
-            raise InputError(
-                title, "is the title of two methods", "Give titles: `first=a.onnx second=dror`."
-            )
-        names[title] = name
-    return names
+    named = [split_title(text) for text in methods]
+    refuse_same_titles([title for title, _ in named])
+    return dict(named)
 
 
 def _view_scan(path: Path, arguments: argparse.Namespace) -> None:

@@ -26,6 +26,7 @@ from derain.evaluation.baselines import (
 from derain.export.methods import (
     load_method_of_one_scan,
     named_method,
+    refuse_same_titles,
     require_one_scan,
     split_title,
 )
@@ -135,14 +136,7 @@ def bench_entries(
     else:
         rows = [_bench_entry(method, learn_from) for method in methods]
     rows = _with_runtime_variants(rows, runtime)
-    titles = [row.title for row in rows]
-    for title in titles:
-        if titles.count(title) > 1:
-            raise InputError(
-                title,
-                "it is the title of two methods",
-                "Give titles, as in `first=a.onnx second=dror`.",
-            )
+    refuse_same_titles([row.title for row in rows])
     return rows
 
 

@@ -172,7 +172,10 @@ def test_a_scan_that_cannot_be_read_is_reported_once_and_shown_empty(
         (["--rerun", "out.png"], "out.png: must end in .rrd"),
         (["--rerun", "out.rrd", "--frames", "9:"], "none of them is among the 4 scans"),
         (["--rerun", "out.rrd", "--methods", "nothing"], "nothing: no such method or file"),
-        (["--rerun", "out.rrd", "--methods", "dror", "dror"], "dror: is the title of two methods"),
+        (
+            ["--rerun", "out.rrd", "--methods", "dror", "dror"],
+            "dror: it is the title of two methods",
+        ),
         (["--rerun", "out.rrd", "--out", "out.png"], "cannot be combined with --out or --window"),
         (["--out", "out.png"], "is more than one scan"),
     ],
