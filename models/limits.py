@@ -1,7 +1,7 @@
 """Limits of a network's hyper-parameters, from a user or a file."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from derain.files.documents import Entry, shown
@@ -9,6 +9,14 @@ from derain.views.neighbours import MOST_NETWORK_NEIGHBOURS
 
 # Its multiples, by what an optimiser divides it by, still are numbers of 32 bits.
 LARGEST_COMPUTABLE = 1e30
+
+# The least and the greatest of each number. A network reads only those that it has.
+LIMITS = {
+    **dict.fromkeys(("learning_rate", "weight_decay", "decay"), (0, LARGEST_COMPUTABLE)),
+    **dict.fromkeys(("balance", "warm_up"), (0, LARGEST_COMPUTABLE)),
+    **dict.fromkeys(("final_share", "momentum", "dropout", "threshold"), (0, 1)),
+    "without_intensity": (-LARGEST_COMPUTABLE, LARGEST_COMPUTABLE),
+}
 
 
 def check_hyperparameters(
@@ -27,8 +35,10 @@ def check_hyperparameters(
     for name, entry in parameters.items():
         _require_plain_values(entry)
         _refuse_another_kind(entry, defaults.get(name))
-        if name in _LIMITS:
-            _LIMITS[name](entry)
+        if name in LIMITS:
+            entry.within(*LIMITS[name])
+        elif name == "neighbours":
+            entry.whole(1, MOST_NETWORK_NEIGHBOURS)
 
 
 def _require_plain_values(entry: Entry) -> None:
@@ -56,23 +66,3 @@ def _refuse_another_kind(entry: Entry, default: Any) -> None:
         entry.truth()
     elif isinstance(default, int | float):
         entry.number()
-
-
-def _number(least: float, most: float = LARGEST_COMPUTABLE) -> Callable[[Entry], object]:
-    return lambda entry: entry.within(least, most)
-
-
-# A network reads only those that it has.
-_LIMITS: dict[str, Callable[[Entry], object]] = {
-    "learning_rate": _number(0),
-    "weight_decay": _number(0),
-    "decay": _number(0),
-    "balance": _number(0),
-    "without_intensity": _number(-LARGEST_COMPUTABLE),
-    "final_share": _number(0, 1),
-    "warm_up": _number(0),
-    "momentum": _number(0, 1),
-    "dropout": _number(0, 1),
-    "threshold": _number(0, 1),
-    "neighbours": lambda entry: entry.whole(1, MOST_NETWORK_NEIGHBOURS),
-}

@@ -77,10 +77,17 @@ class ResidualContext(nn.Module):
 
 
 class JoinedLayers(nn.Module):
-    """Three layers of growing reach, one after the other, joined once with what they began with."""
+    """Three layers of growing reach, one after the other, joined once with what they began with.
 
-    def __init__(self, inputs: int, layers: int, outputs: int) -> None:
+    Args:
+        inputs: Number of input channels.
+        outputs: Number of output channels.
+        layers: Number of channels of each layer; None for half as many as come out.
+    """
+
+    def __init__(self, inputs: int, outputs: int, layers: int | None = None) -> None:
         super().__init__()
+        layers = outputs // 2 if layers is None else layers
         self.layers = nn.ModuleList(
             [
                 FoldingLayer(inputs, layers, kernel=3),
@@ -106,7 +113,7 @@ class DoublingBlock(nn.Module):
         self.narrow = FoldingLayer(inputs, outputs, kernel=1)
         self.skip = FoldingLayer(skipped, outputs, kernel=1)
         self.dropout = nn.Dropout2d(dropout)
-        self.layers = JoinedLayers(outputs, outputs, outputs)
+        self.layers = JoinedLayers(outputs, outputs, layers=outputs)
 
     def forward(self, features: Tensor, skip: Tensor) -> Tensor:
         """Features of the doubled image.
@@ -143,21 +150,16 @@ class SalsaNextLiteNetwork(SalsaNextPlan):
         InputError: A width that is not positive.
     """
 
+    CONTEXT = ResidualContext
+    BLOCK = JoinedLayers
+    DOUBLING = DoublingBlock
+
     def __init__(
         self, channels: int = 5, width: int = 16, classes: int = 2, dropout: float = 0.2
     ) -> None:
         if width < 1:
             raise InputError("width", f"{width} is not positive", "Give 16, or a multiple of it.")
-        super().__init__(
-            channels,
-            width,
-            classes,
-            dropout,
-            context=ResidualContext,
-            block=lambda inputs, outputs: JoinedLayers(inputs, outputs // 2, outputs),
-            halving=partial(nn.MaxPool2d, 2),
-            doubling=DoublingBlock,
-        )
+        super().__init__(channels, width, classes, dropout, partial(nn.MaxPool2d, 2))
 
     def folded(self) -> "SalsaNextLiteNetwork":
         """A copy in evaluation mode that computes the same without a BatchNorm."""
@@ -187,11 +189,8 @@ class SalsaNextLite(SalsaNextModule):
         "MaxPool",
         "Resize",
     )
+    NETWORK: ClassVar[type[nn.Module]] = SalsaNextLiteNetwork
     network: SalsaNextLiteNetwork
-
-    def network_for(self, channels: int, width: int, dropout: float) -> SalsaNextLiteNetwork:
-        """The network, of multiples of a width."""
-        return SalsaNextLiteNetwork(channels, width, dropout=dropout)
 
     def deployed(self) -> DeployedSalsaNext:
         """The network as it is exported: each BatchNorm folded into its convolution."""

@@ -12,8 +12,6 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from derain.errors import InputError
-
 # Added to the share of each class, so that the weight of one that hardly occurs is finite.
 LEAST_SHARE = 1e-3
 
@@ -132,14 +130,7 @@ def class_weights(shares: Sequence[float]) -> Tensor:
 
     Returns:
         float32 (C,).
-
-    Raises:
-        InputError: A share outside 0 to 1.
     """
-    if not all(0 <= share <= 1 for share in shares):
-        raise InputError(
-            "class shares", f"{list(shares)} are not all within 0 and 1", "Count the points again."
-        )
     return torch.tensor([1 / (share + LEAST_SHARE) for share in shares])
 
 

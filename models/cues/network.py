@@ -9,13 +9,7 @@ from torch import Tensor, nn
 
 from derain.models.beam_steps import NEAREST_POINT, USUAL_RANGE, both_logits
 from derain.models.carrier import without_carrier
-from derain.models.cues.geometry import (
-    AcrossFeatures,
-    Geometry,
-    in_steps,
-    taken,
-    taken_of_each,
-)
+from derain.models.cues.geometry import AcrossFeatures, Geometry, in_steps, taken, taken_of_each
 from derain.views.intensity_rank import INTENSITY_RANKS
 from derain.views.isolated_points import SHELLS
 

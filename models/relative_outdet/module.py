@@ -109,11 +109,8 @@ class RelativeOutDet(SupervisedModule):
 
 def _scans_of(batch: Batch) -> Iterator[tuple[Tensor, Tensor, Tensor]]:
     """Points, distances and neighbours of each scan of a batch."""
+    parts = [batch.split(batch.inputs[name]) for name in ("points", "distances", "neighbours")]
     begin = 0
-    for cells in batch.cells:
-        points, distances, neighbours = (
-            batch.inputs[name][begin : begin + cells]
-            for name in ("points", "distances", "neighbours")
-        )
+    for points, distances, neighbours in zip(*parts, strict=True):
         yield points, distances, neighbours - begin
-        begin += cells
+        begin += len(points)

@@ -94,21 +94,6 @@ class RelativeOutDetNetwork(nn.Module):
         Returns:
             Logits of "not rain" and "rain", float (M, 2).
         """
-        rain, far = self.rain_and_range(points, distances, neighbours)
-        if self.training:
-            return both_logits(rain)
-        size = torch.ones_like(rain).double().sum()
-        return both_logits(without_carrier(rain, far, size))
-
-    def rain_and_range(
-        self, points: Tensor, distances: Tensor, neighbours: Tensor
-    ) -> tuple[Tensor, Tensor]:
-        """The parts of :meth:`forward`; arguments are the same.
-
-        Returns:
-            Logits of rain, before what is likely of the carrier is taken back, float (M,); and
-            logarithms of the points' ranges over the usual one, float (M,).
-        """
         seen, far = in_steps(points, distances, neighbours)
         around = active(self.neighbour(seen)).flatten(1)
         features = active(_of_both(self.neighbourhood, around, far[:, None]))
@@ -116,7 +101,11 @@ class RelativeOutDetNetwork(nn.Module):
             features = features + self._context(features, far)
         heard = functional.embedding(neighbours, active(self.to_opinion(features))).flatten(1)
         features = features + active(_of_both(self.opinions, heard, features))
-        return self.head(features)[:, 0], far
+        rain = self.head(features)[:, 0]
+        if self.training:
+            return both_logits(rain)
+        size = torch.ones_like(rain).double().sum()
+        return both_logits(without_carrier(rain, far, size))
 
     def _context(self, features: Tensor, far: Tensor) -> Tensor:
         """Counts of the scan at the range of each point, and in total."""

@@ -6,7 +6,6 @@ Segmentation of LiDAR Point Clouds for Autonomous Driving", ISVC 2020; TiagoCort
 """
 
 import math
-from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 
@@ -83,6 +82,10 @@ class SalsaNextModule(SupervisedModule):
             mistake would count for many.
         spec: Set by derain when it saves a checkpoint; leave it out otherwise.
 
+    Attributes:
+        NETWORK: Kind of its network, from normalised range images (B, channels, H, W) to logits
+            (B, 2, H, W).
+
     Source: TiagoCortinhal/SalsaNext, salsanext.yml, trainer.py, warmupLR.py.
     """
 
@@ -92,6 +95,7 @@ class SalsaNextModule(SupervisedModule):
         *("momentum", "warm_up", "published_loss", "dropout"),
     )
     CHANNELS: ClassVar[tuple[str, ...]] = ("range", "x", "y", "z", "intensity")
+    NETWORK: ClassVar[type[nn.Module]]
 
     def __init__(
         self,
@@ -113,12 +117,8 @@ class SalsaNextModule(SupervisedModule):
     ) -> None:
         super().__init__(channels)
         self.save_hyperparameters()
-        self.network = self.network_for(len(channels), width, dropout)
+        self.network = self.NETWORK(len(channels), width, dropout=dropout)
         self.adopt(spec)
-
-    @abstractmethod
-    def network_for(self, channels: int, width: int, dropout: float) -> nn.Module:
-        """The network, from normalised range images (B, channels, H, W) to logits (B, 2, H, W)."""
 
     def view_for(self, scans: Sequence[Scan]) -> RangeView:
         """The view that the network sees a scan through, its grid fitted if it is not stated."""
@@ -166,10 +166,7 @@ class SalsaNextModule(SupervisedModule):
             return float(self.hparams["decay"] ** ((step - warm_up) / steps))
 
         schedule = torch.optim.lr_scheduler.LambdaLR(optimizer, factor)
-        return {
-            "optimizer": optimizer,
-            "lr_scheduler": {"scheduler": schedule, "interval": "step"},
-        }
+        return {"optimizer": optimizer, "lr_scheduler": {"scheduler": schedule, "interval": "step"}}
 
 
 @NETWORKS.add("salsanext")
@@ -182,11 +179,8 @@ class SalsaNext(SalsaNextModule, Published):
         (8, ('range', 'x', 'y', 'z', 'intensity'))
     """
 
+    NETWORK: ClassVar[type[nn.Module]] = SalsaNextNetwork
     network: SalsaNextNetwork
-
-    def network_for(self, channels: int, width: int, dropout: float) -> SalsaNextNetwork:
-        """The network as published; a width of 32 is the published one."""
-        return SalsaNextNetwork(channels, width, dropout=dropout)
 
     @classmethod
     def from_published(

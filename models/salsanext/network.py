@@ -8,7 +8,7 @@ Segmentation of LiDAR Point Clouds for Autonomous Driving", ISVC 2020; TiagoCort
 from collections.abc import Callable, Mapping
 from functools import partial
 from itertools import pairwise
-from typing import Self
+from typing import ClassVar, Self
 
 import torch
 from torch import Tensor, nn
@@ -64,17 +64,21 @@ class SalsaNextPlan(nn.Module):
             many.
         classes: Number of output channels.
         dropout: Share of the features dropped in training, below full resolution.
-        context: Makes a block at full resolution, of numbers of inputs and outputs.
-        block: Makes a block of the encoder or the bottleneck, of the same.
         halving: Makes a layer that halves the image.
-        doubling: Makes a block of the decoder, of numbers of inputs, of the encoder's features of
-            its size and of outputs, and of the share of features that it drops.
 
     Attributes:
+        CONTEXT: Makes a block at full resolution, of numbers of inputs and outputs.
+        BLOCK: Makes a block of the encoder or the bottleneck, of the same.
+        DOUBLING: Makes a block of the decoder, of numbers of inputs, of the encoder's features of
+            its size and of outputs, and of the share of features that it drops.
         channels: As given.
         width: As given.
         classes: As given.
     """
+
+    CONTEXT: ClassVar[type[nn.Module]]
+    BLOCK: ClassVar[type[nn.Module]]
+    DOUBLING: ClassVar[type[nn.Module]]
 
     def __init__(
         self,
@@ -82,11 +86,7 @@ class SalsaNextPlan(nn.Module):
         width: int,
         classes: int,
         dropout: float,
-        *,
-        context: Callable[[int, int], nn.Module],
-        block: Callable[[int, int], nn.Module],
         halving: Callable[[], nn.Module],
-        doubling: Callable[[int, int, int, float], nn.Module],
     ) -> None:
         super().__init__()
         self.channels, self.width, self.classes = channels, width, classes
@@ -94,13 +94,13 @@ class SalsaNextPlan(nn.Module):
         decoder = [width * factor for factor in (8, 4, 4, 2, 1)]
         rates = (0.0, dropout, dropout, dropout)  # from full resolution downwards
         self.context = nn.Sequential(
-            *(context(inputs, width) for inputs in (channels, width, width))
+            *(self.CONTEXT(inputs, width) for inputs in (channels, width, width))
         )
-        self.encoder = nn.ModuleList(block(*pair) for pair in pairwise(encoder))
+        self.encoder = nn.ModuleList(self.BLOCK(*pair) for pair in pairwise(encoder))
         self.halve = nn.ModuleList(nn.Sequential(nn.Dropout2d(rate), halving()) for rate in rates)
-        self.bottleneck = nn.Sequential(block(encoder[-1], decoder[0]), nn.Dropout2d(dropout))
+        self.bottleneck = nn.Sequential(self.BLOCK(encoder[-1], decoder[0]), nn.Dropout2d(dropout))
         self.decoder = nn.ModuleList(
-            doubling(inputs, skipped, outputs, rate)
+            self.DOUBLING(inputs, skipped, outputs, rate)
             for (inputs, outputs), skipped, rate in zip(
                 pairwise(decoder), reversed(encoder[1:]), reversed(rates), strict=True
             )
@@ -245,6 +245,10 @@ class SalsaNextNetwork(SalsaNextPlan):
         InputError: A width that is not a positive even number.
     """
 
+    CONTEXT = ContextBlock
+    BLOCK = DilatedBlock
+    DOUBLING = DecoderBlock
+
     def __init__(
         self, channels: int = 5, width: int = 32, classes: int = 2, dropout: float = 0.2
     ) -> None:
@@ -253,16 +257,8 @@ class SalsaNextNetwork(SalsaNextPlan):
             raise InputError(
                 "width", f"{width} is not a positive even number", "Give 32, as published, 16 or 8."
             )
-        super().__init__(
-            channels,
-            width,
-            classes,
-            dropout,
-            context=ContextBlock,
-            block=DilatedBlock,
-            halving=partial(nn.AvgPool2d, 3, stride=2, padding=1),
-            doubling=DecoderBlock,
-        )
+        halving = partial(nn.AvgPool2d, 3, stride=2, padding=1)
+        super().__init__(channels, width, classes, dropout, halving)
 
     @classmethod
     def from_published(cls, state_dict: Mapping[str, Tensor]) -> Self:
