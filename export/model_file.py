@@ -131,20 +131,17 @@ def number_of_weights(content: bytes) -> int:
     """
     graphs = _parts(memoryview(content), GRAPH)
     tensors = [tensor for graph in graphs for tensor in _parts(graph, INITIALIZER)]
-    return sum(prod(_dimensions(tensor)) for tensor in tensors)
+    sizes = [
+        [size for number, size in _fields(tensor) if number == DIMENSIONS and isinstance(size, int)]
+        for tensor in tensors
+    ]
+    return sum(map(prod, sizes))
 
 
 def _parts(message: memoryview, of_number: int) -> Iterator[memoryview]:
     """The messages in one field of a message."""
     for number, value in _fields(message):
         if number == of_number and isinstance(value, memoryview):
-            yield value
-
-
-def _dimensions(tensor: memoryview) -> Iterator[int]:
-    """The sizes of a tensor."""
-    for number, value in _fields(tensor):
-        if number == DIMENSIONS and isinstance(value, int):
             yield value
 
 
@@ -170,11 +167,10 @@ def _checksum(content: bytes, place: int) -> str:
 def _metadata(content: bytes) -> str:
     """The text under METADATA_KEY; empty where there is none."""
     text = b""
-    for number, value in _fields(memoryview(content)):
-        if number == METADATA_PROPS and isinstance(value, memoryview):
-            prop = {key: bytes(part) for key, part in _fields(value) if not isinstance(part, int)}
-            if prop.get(PROP_KEY) == METADATA_KEY.encode():
-                text = prop.get(PROP_VALUE, b"")
+    for entry in _parts(memoryview(content), METADATA_PROPS):
+        prop = {key: bytes(part) for key, part in _fields(entry) if not isinstance(part, int)}
+        if prop.get(PROP_KEY) == METADATA_KEY.encode():
+            text = prop.get(PROP_VALUE, b"")
     return text.decode("utf-8")
 
 

@@ -137,13 +137,10 @@ def _proof(
         assert bounds.difference is not None
         bounds = replace(bounds, difference=bounds.difference * model.LOGIT_GAIN)
         return prove(model, path, _hard_cases(model.spec), bounds, runtime)
-    seen = prove(model, path, map(_named_scan, calibration), INT8, runtime)
+    scans = ((frame.name, frame.read()) for frame in calibration)
+    seen = prove(model, path, scans, INT8, runtime)
     hard = prove(model, path, _hard_cases(model.spec), FINITE, runtime)
     return Proof(seen.cases + hard.cases)
-
-
-def _named_scan(frame: Frame) -> tuple[str, Scan]:
-    return frame.name, frame.read()
 
 
 def _hard_cases(spec: Spec) -> Iterator[tuple[str, Scan]]:

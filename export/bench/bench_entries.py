@@ -191,7 +191,8 @@ def _bench_entry(method: GivenMethod, learn_from: LearnFrom | None) -> BenchEntr
             row = _model(printable(Path(name).stem), name, method, ready)
             return row if method.runtime.is_default else _with_runtime(row, method.runtime)
         case _ if callable(method) and not isinstance(method, type):
-            return _function(method)
+            title = printable(getattr(method, "__name__", type(method).__name__))
+            return BenchEntry(title, "function", TimedFunction(method).ready)
     raise InputError(
         "methods",
         f"{method!r} is no method",
@@ -265,11 +266,6 @@ def _learnt(title: str, name: str, learn_from: LearnFrom | None) -> BenchEntry:
     learnt = repr((float(rule.intensity), float(rule.range)))  # not rounded, as the facts are
     ready = TimedFunction(rule).ready
     return BenchEntry(title, name, ready, {"rule": limits}, spec_or_filter=rule, learnt=learnt)
-
-
-def _function(function: Callable[[Scan], NDArray[Any]]) -> BenchEntry:
-    title = printable(getattr(function, "__name__", type(function).__name__))
-    return BenchEntry(title, "function", TimedFunction(function).ready)
 
 
 @dataclass(frozen=True)

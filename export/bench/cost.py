@@ -9,16 +9,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from derain.errors import reason_of
 from derain.export.bench.bench_entries import BenchEntry
 from derain.export.timing import RunTimes, timed_runs
-from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.system.memory import keep_freed_memory
-from derain.system.stopwatch import Stopwatch
 from derain.system.workers import without_main_module, worker_pool
 
 
@@ -27,16 +22,14 @@ class Timing:
     """Options for timing methods.
 
     Attributes:
-        frames: Scans to time them on, one or more.
+        frames: Scans to time them on, one or more, in the unit of the methods.
         threads: Threads of view and network; 0 takes every core this process may use.
         repeats: Timed runs on each scan.
-        intensity_scale: Factor from the scans' intensities to the unit of the methods.
     """
 
     frames: Sequence[Frame]
     threads: int = 0
     repeats: int = 3
-    intensity_scale: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -77,12 +70,7 @@ def measure_cost(bench_entry: BenchEntry, timing: Timing) -> Cost:
 
 def measure_in_process(bench_entry: BenchEntry, timing: Timing) -> Cost:
     """Runs a method on every scan, in turns, in this process; see :func:`measure_cost`."""
-    method = bench_entry.ready(timing.threads)
-
-    def judge(scan: Scan, stopwatch: Stopwatch) -> NDArray[np.bool_]:
-        return method(scan.with_intensity_times(timing.intensity_scale), stopwatch)
-
-    times = timed_runs(judge, timing.frames, timing.repeats)
+    times = timed_runs(bench_entry.ready(timing.threads), timing.frames, timing.repeats)
     return Cost(times, _peak_memory())
 
 
