@@ -73,7 +73,7 @@ class ScanCheck(lightning.Callback):
 def _warn_without_rain(trainer: lightning.Trainer, model: Any) -> None:
     # Every process counts, for the counts of all are gathered.
     measured = model.metrics.counts()
-    counts = measured.pooled()
+    counts = measured.pooled
     if trainer.is_global_zero and measured.per_scan:
         warn_without_rain(bool(counts.true_positive + counts.false_negative), model.card)
 

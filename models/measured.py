@@ -182,7 +182,7 @@ class MeasuredModule(lightning.LightningModule, ABC):
         """The score that chooses the best checkpoint, given the loss of the validation scans."""
         if not self.LEARNS_FROM_LABELS:
             return -loss
-        counts = self.metrics.counts().pooled()
+        counts = self.metrics.counts().pooled
         if counts.true_positive + counts.false_negative:
             return torch.tensor(counts.iou, dtype=torch.float32, device=loss.device)
         # Without rain the IoU is undefined, or 0 because of a single point.

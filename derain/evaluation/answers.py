@@ -195,8 +195,8 @@ class TruthRecord:
 
     def rows_by_class(self, first: str, second: str) -> list[list[str]]:
         """Each class that has points: its name, its points, and what two answers call rain."""
-        others, rows = self.counts[second].by_class(), []
-        for name, counts in self.counts[first].by_class().items():
+        others, rows = self.counts[second].by_class, []
+        for name, counts in self.counts[first].by_class.items():
             if counts.points:
                 title = f"{name} (rain)" if counts.rain else name
                 shares = (counts.share_lost, others[name].share_lost)
@@ -207,7 +207,7 @@ class TruthRecord:
     def __str__(self) -> str:
         scores = [["", "points", "precision", "recall", "IoU"]]
         for title, counted in self.counts.items():
-            pooled = counted.pooled()
+            pooled = counted.pooled
             numbers = map(number_text, (pooled.precision, pooled.recall, pooled.iou))
             scores.append([title, f"{sum(astuple(pooled)):,}", *numbers])
         classes = [["class", "points", "called rain", "of those it is sure of"]]

@@ -239,6 +239,7 @@ class RainCounts:
         self.cells += cells
         self.per_scan.append(self._counts(cells))
 
+    @property
     def pooled(self) -> Counts:
         """Counts over the points of all scans."""
         return self._counts(self.cells)
@@ -247,11 +248,13 @@ class RainCounts:
         """Counts over the points of some classes, such as those of one of several data sets."""
         return self._counts(self.cells * np.isin(self.ids, [*ids])[:, None, None])
 
+    @property
     def by_class(self) -> dict[str, ClassCounts]:
         """Counts of each semantic class, by name."""
         bands = self.by_class_and_range().items()
         return {name: sum(others, first) for name, (first, *others) in bands}
 
+    @property
     def by_range(self) -> dict[str, Counts]:
         """Counts of each band of range, by ``band_names``."""
         names = enumerate(band_names())

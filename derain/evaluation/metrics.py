@@ -58,7 +58,7 @@ class RainMetrics(Metric):
         counts = RainCounts(self.card)
         counts.add(scan, called_rain)
         self.cells += torch.from_numpy(counts.cells).to(self.device)
-        self.per_scan.append(self.cells.new_tensor([astuple(counts.pooled())]))
+        self.per_scan.append(self.cells.new_tensor([astuple(counts.pooled)]))
 
     def compute(self) -> dict[str, Tensor]:
         """Every score over all points, and as the mean over scans (``…_per_scan``).
@@ -69,7 +69,7 @@ class RainMetrics(Metric):
             the rows agree with pooled counts, save LiSnowNet's, which fit means over scans.
         """
         counts = self._counts()
-        pooled, per_scan = counts.pooled(), counts.per_scan
+        pooled, per_scan = counts.pooled, counts.per_scan
         scores = {score: getattr(pooled, score) for score in SCORES}
         scores |= {f"{score}_per_scan": mean_over_scans(per_scan, score) for score in SCORES}
         return {

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from derain.cards.card import DataCard
 from derain.errors import reason_of
-from derain.evaluation.counts import ClassCounts, Counts, RainCounts
+from derain.evaluation.counts import Counts, RainCounts
 from derain.scan import Scan
 from derain.views.morton import first_rows
 
@@ -19,43 +19,22 @@ from derain.views.morton import first_rows
 ScoredMethod = Callable[[Scan], NDArray[np.bool_]]
 
 
-class Scores:
-    """Counts of the answers of one method, scan after scan.
+class Scores(RainCounts):
+    """Counts of the answers of one method, scan after scan, also by rain rate and by sensor.
 
     Args:
         card: Data card of the scans.
 
     Attributes:
-        counts: The points of all scans, by class and by range.
         by_sensor: Points of the LiDAR and of the radar; empty where they are not distinguished.
         failures: Errors, by the scan's name. In such a scan, no point counts as called rain.
     """
 
     def __init__(self, card: DataCard) -> None:
-        self.counts = RainCounts(card)
+        super().__init__(card)
         self.by_sensor: defaultdict[str, Counts] = defaultdict(Counts)
         self.failures: dict[str, str] = {}
         self._by_rate: defaultdict[float, Counts] = defaultdict(Counts)
-
-    @property
-    def pooled(self) -> Counts:
-        """All points together."""
-        return self.counts.pooled()
-
-    @property
-    def per_scan(self) -> Sequence[Counts]:
-        """The points of each scan, in order."""
-        return self.counts.per_scan
-
-    @property
-    def by_class(self) -> Mapping[str, ClassCounts]:
-        """Each semantic class, by name."""
-        return self.counts.by_class()
-
-    @property
-    def by_range(self) -> Mapping[str, Counts]:
-        """Each band of range, by names such as ``0-10 m``."""
-        return self.counts.by_range()
 
     @property
     def by_rain_rate(self) -> Mapping[str, Counts]:
@@ -72,30 +51,29 @@ class Scores:
             self.failures[scan.name] = reason_of(error)
             predicted = np.zeros(len(scan), bool)
         scan, predicted = scan.take(counted), predicted[counted]
-        self.counts.add(scan, predicted)
+        self.add(scan, predicted)
         if rate is not None:
-            self._by_rate[rate] += self.counts.per_scan[-1]
+            self._by_rate[rate] += self.per_scan[-1]
         if scan.radar is not None:
-            card = self.counts.card
-            rain, known = card.rain_of(scan), ~card.unknown_of(scan)
+            rain, known = self.card.rain_of(scan), ~self.card.unknown_of(scan)
             for sensor, points in {"LiDAR": ~scan.radar, "radar": scan.radar}.items():
                 rows = known & points
                 self.by_sensor[sensor] += Counts.of(predicted[rows], rain[rows])
 
     def to_json(self) -> dict[str, Any]:
-        """The counts so far, as :meth:`add` takes them."""
+        """The counts so far, as :meth:`add_json` takes them."""
         return {
-            "cells": self.counts.cells.tolist(),
-            "per_scan": [astuple(counts) for counts in self.counts.per_scan],
+            "cells": self.cells.tolist(),
+            "per_scan": [astuple(counts) for counts in self.per_scan],
             "by_rain_rate": [[rate, *astuple(each)] for rate, each in self._by_rate.items()],
             "by_sensor": [[sensor, *astuple(each)] for sensor, each in self.by_sensor.items()],
             "failures": self.failures,
         }
 
-    def add(self, later: Mapping[str, Any]) -> None:
+    def add_json(self, later: Mapping[str, Any]) -> None:
         """Adds the counts of later scans, which may come from another process."""
-        self.counts.cells += np.array(later["cells"], np.int64)
-        self.counts.per_scan += [Counts(*counts) for counts in later["per_scan"]]
+        self.cells += np.array(later["cells"], np.int64)
+        self.per_scan += [Counts(*counts) for counts in later["per_scan"]]
         for rate, *counts in later["by_rain_rate"]:
             self._by_rate[rate] += Counts(*counts)
         for sensor, *counts in later["by_sensor"]:

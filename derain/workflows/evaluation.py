@@ -178,7 +178,7 @@ def _measure(record: TruthRecord, frame: Frame, taught: DataCard, student: Stude
 def _tables(record: TruthRecord) -> str:
     """Scores over the points of all scans, and the share of each class that is called rain."""
     scores = [
-        [title, *(number_text(getattr(counted.pooled(), score)) for score in SCORES)]
+        [title, *(number_text(getattr(counted.pooled, score)) for score in SCORES)]
         for title, counted in record.counts.items()
     ]
     classes = record.rows_by_class("teacher", "student")

@@ -242,11 +242,12 @@ def run_bench(
     for note in notes:
         warn(note)
     timed_on = evenly_spaced(data.frames, effort.timed)
-    timing = Timing(timed_on, effort.threads, effort.repeats, data.intensity_scale)
+    in_unit = [frame.with_intensity_times(data.intensity_scale) for frame in timed_on]
+    timing = Timing(in_unit, effort.threads, effort.repeats)
     scores = [Scores(data.card) for _ in methods]
     for of_unit in counted:
         for of_method, counts in zip(scores, of_unit["counts"], strict=True):
-            of_method.add(counts)
+            of_method.add_json(counts)
         for scan, method, kind, detail in of_unit["issues"]:
             notices.warn(scan, [ScanIssue(kind, detail)], method)
     rained = any(one.pooled.true_positive + one.pooled.false_negative for one in scores)
@@ -259,7 +260,7 @@ def run_bench(
     rows = bench_rows(methods, scores, costs, np.random.default_rng(effort.seed))
     files = [file for of_unit in counted for file in of_unit["files"]]
     facts = _facts(command, data, timing, effort.seed, methods, files)
-    changed = [_changed(method, timing, data) for method in methods if method.usual is not None]
+    changed = [_changed(method, timing) for method in methods if method.usual is not None]
     return Bench(rows, {**facts, "notes": notes, "runtimes": changed})
 
 
@@ -287,16 +288,16 @@ def scored_methods(bench_entries: Sequence[BenchEntry], threads: int) -> list[Sc
     ]
 
 
-def _untimed(method: TimedMethod, scan: Scan) -> NDArray[np.bool_]:
-    return method(scan, Stopwatch())
-
-
 def _overlap(method: BenchEntry, data: LabelledFrames) -> str | None:
     """A note where a model was trained on the scans that it is measured on."""
     spec = method.spec_or_filter
     if not isinstance(spec, Spec):
         return None
     return training_overlap(method.title, spec, data.card, data.frames)
+
+
+def _untimed(method: TimedMethod, scan: Scan) -> NDArray[np.bool_]:
+    return method(scan, Stopwatch())
 
 
 @dataclass(frozen=True)
@@ -370,7 +371,7 @@ def _fingerprint(content: object) -> str:
     return sha256(repr(content).encode()).hexdigest()[:16]
 
 
-def _changed(method: BenchEntry, timing: Timing, data: LabelledFrames) -> dict[str, Any]:
+def _changed(method: BenchEntry, timing: Timing) -> dict[str, Any]:
     """Compares a model in another runtime with the same model in onnxruntime.
 
     Returns:
@@ -386,7 +387,7 @@ def _changed(method: BenchEntry, timing: Timing, data: LabelledFrames) -> dict[s
         assert isinstance(usual, Derainer)
         assert isinstance(other, Derainer)
         # Nothing holds on to a scan while the next one is read.
-        scans = ((frame.name, data.reader.read(frame)) for frame in timing.frames)
+        scans = ((frame.name, frame.read()) for frame in timing.frames)
         proof = compare_runtimes(usual, other, scans)
     except Exception as error:  # its row states whatever a runtime raises
         return {**changed, "failure": reason_of(error)}

@@ -173,7 +173,7 @@ class ErrorPanels(lightning.Callback):
     ) -> None:
         # All processes put the counts together, the first one draws.
         points, measured = model.threshold_counts.points(), model.metrics.counts()
-        if not any(counts.points for counts in measured.by_class().values()):
+        if not any(counts.points for counts in measured.by_class.values()):
             return  # as of scans that hold no point, or none whose class is known
         table = measured.by_class_and_range()
         title = f"{part} on {model.card.name}, step {step:,}"
@@ -193,9 +193,9 @@ class ErrorPanels(lightning.Callback):
 
 def errors_by_name(measured: RainCounts) -> dict[str, float]:
     """Shares that are judged wrongly, by the names of their scalars; where there are points."""
-    classes = measured.by_class().items()
+    classes = measured.by_class.items()
     shares = {f"{BY_CLASS}/{name}": each.share_wrong for name, each in classes if each.points}
-    bands = measured.by_range()
+    bands = measured.by_range
     for band, counts in bands.items():
         if counts.true_positive + counts.false_negative:
             shares[f"{LEFT_BY_RANGE}/{band}"] = 1 - counts.recall

@@ -26,7 +26,8 @@ class TestReport(lightning.Callback):
         """Prints the report, and writes it beside the run's log where there is one."""
         # Counts and folder are put together by all processes, the report is the first one's.
         text = as_text(model.metrics, model.card.name)
-        scores = {"data": model.card.name, "checkpoint": _tested(trainer), **as_dict(model.metrics)}
+        checkpoint = None if trainer.ckpt_path is None else str(trainer.ckpt_path)
+        scores = {"data": model.card.name, "checkpoint": checkpoint, **as_dict(model.metrics)}
         folder = trainer.log_dir
         if not trainer.is_global_zero:
             return
@@ -41,10 +42,6 @@ class TestReport(lightning.Callback):
             print(printable(f"Written to {path}"))
 
 
-def _tested(trainer: lightning.Trainer) -> str | None:
-    return None if trainer.ckpt_path is None else str(trainer.ckpt_path)
-
-
 def as_dict(metrics: RainMetrics) -> dict[str, object]:
     """Scores and counts as JSON-able primitives; a score that is undefined is None."""
     measured = metrics.counts()
@@ -53,11 +50,11 @@ def as_dict(metrics: RainMetrics) -> dict[str, object]:
         "scans": len(measured.per_scan),
         "classes": {
             name: {"points": counts.points, "called_rain": counts.called_rain, "rain": counts.rain}
-            for name, counts in measured.by_class().items()
+            for name, counts in measured.by_class.items()
         },
         "ranges": {
             name: {score: or_none(getattr(counts, score)) for score in SCORES}
-            for name, counts in measured.by_range().items()
+            for name, counts in measured.by_range.items()
         },
     }
 
@@ -66,16 +63,14 @@ def as_text(metrics: RainMetrics, data: str) -> str:
     """Scores and counts as three small tables; ``-`` is a score that is undefined."""
     measured = metrics.counts()
     scores = {name: float(score) for name, score in metrics.compute().items()}
-    lines = [
-        f"{data}, {len(measured.per_scan)} scans      precision  recall      F1     IoU",
-    ]
+    lines = [f"{data}, {len(measured.per_scan)} scans      precision  recall      F1     IoU"]
     width = lines[0].index("precision")
     for average, suffix in (("pooled over points", ""), ("mean over scans", "_per_scan")):
         lines.append(average.ljust(width) + _row([scores[score + suffix] for score in SCORES]))
-    for band, counts in measured.by_range().items():
+    for band, counts in measured.by_range.items():
         lines.append(band.ljust(width) + _row([getattr(counts, score) for score in SCORES]))
     lines += ["", "class".ljust(width) + "   points  called rain   share"]
-    for name, of_class in measured.by_class().items():
+    for name, of_class in measured.by_class.items():
         if of_class.points:
             name += " (rain)" if of_class.rain else ""
             lines.append(

@@ -79,13 +79,13 @@ def test_scores_are_those_of_scikit_learn_and_all_counts_add_up(points) -> None:
         known = scan.label != 255
         truths.append(np.isin(scan.label[known], RAIN))
         answers.append(called[known])
-    groups = [*counts.per_scan, counts.pooled()]
+    groups = [*counts.per_scan, counts.pooled]
     pairs = [*zip(truths[1:], answers[1:], strict=True)]
     pairs.append((np.concatenate(truths), np.concatenate(answers)))
     for group, pair in zip(groups, pairs, strict=True):
         assert [getattr(group, score) for score in SCORES] == approx(reference(*pair), rel=1e-12)
-    assert counts.pooled() == sum(counts.per_scan, Counts())
-    assert counts.pooled() == sum(counts.by_range().values(), Counts())
+    assert counts.pooled == sum(counts.per_scan, Counts())
+    assert counts.pooled == sum(counts.by_range.values(), Counts())
 
 
 def test_points_are_counted_by_class_and_by_the_band_that_begins_at_an_edge() -> None:
@@ -96,14 +96,14 @@ def test_points_are_counted_by_class_and_by_the_band_that_begins_at_an_edge() ->
     counts.add(
         Scan(np.stack([x, 0 * x, 0 * x], axis=1).astype(np.float32)).with_label(label), called
     )
-    assert counts.by_range() == {
+    assert counts.by_range == {
         "0-10 m": Counts(1, 1, 0, 0),
         "10-20 m": Counts(0, 0, 0, 1),
         "20-40 m": Counts(0, 0, 1, 0),
         "40-80 m": Counts(),
         "80+ m": Counts(0, 1, 1, 2),
     }
-    by_class = counts.by_class()
+    by_class = counts.by_class
     assert by_class == {
         "ground": ClassCounts(4, 2, rain=False),
         "rain": ClassCounts(2, 1, rain=True),
@@ -140,12 +140,12 @@ def test_a_metric_counts_alike_in_any_precision_and_forgets_when_reset() -> None
     computed = metric.compute()
     assert {(value.shape, value.dtype) for value in computed.values()} == {((), torch.float32)}
     for score in SCORES:
-        assert computed[score] == pytest.approx(getattr(expected.pooled(), score))
+        assert computed[score] == pytest.approx(getattr(expected.pooled, score))
         mean = mean_over_scans(expected.per_scan, score)
         assert computed[f"{score}_per_scan"] == pytest.approx(mean)
     metric.reset()
     assert metric.counts().per_scan == []
-    assert metric.counts().pooled() == Counts()
+    assert metric.counts().pooled == Counts()
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -111,7 +111,7 @@ def test_the_picture_shows_methods_with_a_time_and_an_iou_and_how_large_files_ar
 ) -> None:
     filter_, baseline, failed = rows
     of_file = replace(filter_, bench_entry=replace(filter_.bench_entry, facts={FILE_SIZE: 67_535}))
-    dry = replace(filter_, scores=Scores(filter_.scores.counts.card))
+    dry = replace(filter_, scores=Scores(filter_.scores.card))
     draw_speed_error([of_file, baseline, failed, dry], FACTS, tmp_path / "speed_error.png")
     ((axes,),) = [figure.axes for figure in saved_figures]
     assert [text.get_text() for text in axes.texts] == ["dror · 68 kB", "all"]

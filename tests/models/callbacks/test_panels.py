@@ -184,12 +184,12 @@ def test_the_numbers_are_those_of_the_counts(train) -> None:
     }
     assert all(len(events.Scalars(tag)) == 2 for tag in last)
     measured = model.metrics.counts()
-    pooled, classes = measured.pooled(), measured.by_class()
+    pooled, classes = measured.pooled, measured.by_class
     assert {tag for tag in last if tag.startswith("errors_by_class")} == {
         f"errors_by_class/{name}" for name, counts in classes.items() if counts.points
     }
     assert last["errors_by_class/falling-snow"] == pytest.approx(1 - pooled.recall)
-    for band, counts in measured.by_range().items():
+    for band, counts in measured.by_range.items():
         left, lost = f"rain_left_by_range/{band}", f"lost_by_range/{band}"
         rain = counts.true_positive + counts.false_negative
         others = counts.false_positive + counts.true_negative
@@ -203,11 +203,11 @@ def test_the_numbers_are_those_of_the_counts(train) -> None:
 def test_the_curve_goes_through_the_counts_at_the_threshold(train) -> None:
     _, model, events = train(1, ErrorPanels())
     points = model.threshold_counts.points()
-    assert points.counts(points.at(model.spec.threshold)) == model.metrics.counts().pooled()
+    assert points.counts(points.at(model.spec.threshold)) == model.metrics.counts().pooled
     (event,) = events.Tensors("validation: rain")
     curve = tensor_util.make_ndarray(event.tensor_proto)
     assert curve.shape == (6, len(CURVE_THRESHOLDS))
-    counts = model.metrics.counts().pooled()
+    counts = model.metrics.counts().pooled
     expected = [
         *(counts.true_positive, counts.false_positive),
         *(counts.true_negative, counts.false_negative),
