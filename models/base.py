@@ -71,7 +71,6 @@ class DerainingModule(MeasuredModule):
     network: nn.Module
     mean: Tensor
     std: Tensor
-    card: DataCard
 
     def __init__(self, channels: Sequence[str]) -> None:
         super().__init__()
@@ -158,20 +157,6 @@ class DerainingModule(MeasuredModule):
     @abstractmethod
     def configure_optimizers(self) -> OptimizerLRScheduler:
         """The optimiser and its schedule, for Lightning."""
-
-    def begin_from(self, source: "DerainingModule") -> None:
-        """Takes over the weights of a trained model, to be trained on.
-
-        Raises:
-            InputError: A model of another network.
-        """
-        if type(source) is not type(self):
-            raise InputError(
-                source.NAME,
-                f"a model of {source.NAME}, from which {self.NAME} cannot start",
-                f"Train {source.NAME}, or give a checkpoint of {self.NAME}.",
-            )
-        self.load_state_dict(source.state_dict())
 
     def deployed(self) -> nn.Module:
         """The network for export, in evaluation mode: from raw inputs to logits.

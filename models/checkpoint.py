@@ -105,16 +105,19 @@ def started(model: DerainingModule, checkpoint: Path, name: str) -> DerainingMod
         InputError: A checkpoint that cannot be read, or one of another network.
     """
     source = load_model(checkpoint)
+    if type(source) is not type(model):
+        raise InputError(
+            checkpoint,
+            f"a model of {source.NAME}, from which {model.NAME} cannot start",
+            f"Train {source.NAME}, or give a checkpoint of {model.NAME}.",
+        )
     arguments = {
         argument: own if argument in model.RECIPE else source.hparams.get(argument, own)
         for argument, own in _arguments(model.hparams).items()
         if argument != "spec"
     }
     student = type(model)(**arguments)
-    try:
-        student.begin_from(source)
-    except InputError as error:
-        raise InputError(checkpoint, error.reason, error.remedy) from error
+    student.load_state_dict(source.state_dict())
     # By what Lightning's command line has entered there, it reads a checkpoint back.
     student.hparams.update({key: own for key, own in model.hparams.items() if key[0] == "_"})
     with reading(checkpoint):

@@ -46,10 +46,6 @@ class Published(ABC):
 class Placeholder:
     """Stands for what a checkpoint holds besides values: it is given anything and does nothing."""
 
-    def __new__(cls, *_: object) -> Self:
-        """An object that holds nothing."""
-        return super().__new__(cls)
-
     def __init__(self, *_: object) -> None:
         """Forgets what it is given."""
 

@@ -24,8 +24,6 @@ class RainMetrics(Metric):
         InputError: Two classes of one name, or rain that is no known class.
     """
 
-    is_differentiable = False
-    higher_is_better = True
     full_state_update = False
 
     cells: Tensor

@@ -36,15 +36,10 @@ class Start:
             for data, record in records
         )
         starts = (*self.spec.training.get(STARTED_FROM, ()), self.name)
-        spec = replace(
+        return replace(
             spec,
             licence=f"{spec.licence}; started from {self.spec.data} ({self.spec.licence})",
             training={**together, STARTED_FROM: starts},
-        )
-        if spec.network != self.spec.network:  # it began from a part of what it is
-            return spec
-        return replace(
-            spec,
             view=self.spec.view,
             units=self.spec.units,
             mean=self.spec.mean,

@@ -19,7 +19,6 @@ from derain.learning.batch import Batch, Sample
 from derain.models.cues import CueFusion
 from derain.models.cues.geometry import in_steps
 from derain.models.cues.network import LARGEST_LOG_ODDS, Calibration
-from derain.models.outdet import OutDet
 from derain.scan import Scan
 from derain.views.intensity_rank import INTENSITY_RANKS
 from derain.views.isolated_points import SHELLS
@@ -144,11 +143,9 @@ def test_a_batch_without_a_point_to_learn_from_has_no_loss(trained) -> None:
     assert losses["loss"] == 0
 
 
-def test_it_needs_its_neighbours_and_a_start_of_its_kind() -> None:
+def test_it_needs_its_neighbours() -> None:
     with pytest.raises(InputError, match="neighbours: 8 are too few"):
         CueFusion(neighbours=8)
-    with pytest.raises(InputError, match="from which cues cannot start"):
-        CueFusion().begin_from(OutDet())
 
 
 @pytest.mark.parametrize("turn", [0.3, 2.0, np.pi])
