@@ -37,18 +37,16 @@ class Sample:
     milliseconds: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
-    def of(
-        cls, scan: Scan, view: ViewedScan, card: DataCard, measured: bool = True, key: str = ""
-    ) -> "Sample":
+    def of(cls, scan: Scan, view: ViewedScan, card: DataCard, key: str = "") -> "Sample":
         """Gives a view its target, by the labels of its scan if there are any.
 
         Cells of points of unknown class are not judged.
         """
         if scan.label is None:
-            return cls(scan, view, None, measured, key)
+            return cls(scan, view, None, key=key)
         target = view.target(card.rain_of(scan))
         target[view.target(card.unknown_of(scan)) == 1] = IGNORED
-        return cls(scan, view, torch.from_numpy(target), measured, key)
+        return cls(scan, view, torch.from_numpy(target), key=key)
 
 
 @dataclass(frozen=True, eq=False)

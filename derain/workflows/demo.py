@@ -1,7 +1,7 @@
 """The demonstration: simulated rain, three networks, and a comparison with other methods."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +10,7 @@ from derain.datamodules.scan_data import Loading, ScanData
 from derain.default import DEFAULT
 from derain.errors import InputError
 from derain.example import EXAMPLE, Truth
-from derain.export.bench.bench import Bench, Effort, run_bench
-from derain.export.bench.bench_entries import bench_entries
-from derain.export.bench.labelled_frames import LabelledFrames
+from derain.export.bench.bench import Bench, Effort, bench
 from derain.export.bench.report import SHORT, main_table
 from derain.export.methods import load_method, load_method_of_one_scan, named_method
 from derain.files import DEFAULT_COLUMNS
@@ -26,7 +24,6 @@ from derain.sources.cleaned_scan import ScanOutcome
 from derain.sources.cleaning import CleaningObserver, CleanReport, clean
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
-from derain.sources.source import Source
 from derain.system.cores import usable_cores
 from derain.system.notices import Notices, warn
 from derain.views.scan_issues import ScanIssue
@@ -197,17 +194,19 @@ def _compare(config: DemoConfig, data: ScanData, steps: Steps) -> Bench:
     steps.begin("Comparison: error, time and memory of every method on the same scans")
     networks = [f"{title}={config.model(title)}" for title in config.networks]
     names = [*networks, f"dsor, tuned={config.tuned}", *config.others]
-    rates = rain_rates([config.data], None)
-
-    def labelled(frames: Source) -> LabelledFrames:
-        return LabelledFrames(data.card, frames, 1.0, data.distinct, rates)
-
-    methods = bench_entries(names, lambda: labelled(data.frames("train")).truths())
     out = config.out / "bench"
     require_writable(out / "bench.json")
+    found = bench(
+        names,
+        data.frames("test"),
+        data.card,
+        train=data.frames("train"),
+        rain_rates=rain_rates([config.data], None),
+        **asdict(config.effort),
+    )
     quoted = " ".join(f"'{name}'" if " " in name else name for name in names)
     command = f"derain bench --data {config.data} --out {out} --methods {quoted}"
-    found = run_bench(methods, labelled(data.frames("test")), config.effort, command)
+    found = replace(found, facts={**found.facts, "command": command})
     found.write(out)
     steps.end(str(out / "bench.md"))
     return found

@@ -80,11 +80,7 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
         poses = _find_poses(config, source, steps)
         teacher = over_recording(load_method(*named_method(config.teacher)))
         found = named_frames(
-            config.recordings,
-            config.columns,
-            labelled=True,
-            recordings=True,
-            topic=config.topic,
+            config.recordings, config.columns, labelled=True, recordings=True, topic=config.topic
         )
         recording = placed(found, poses)
         _teach(config, teacher, recording, steps, warnings)

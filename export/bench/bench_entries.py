@@ -16,13 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError, printable
-from derain.evaluation.baselines import (
-    VOXEL,
-    IntensityRule,
-    PositionPrior,
-    all_points,
-    no_points,
-)
+from derain.evaluation.baselines import VOXEL, IntensityRule, PositionPrior, all_points, no_points
 from derain.export.methods import (
     load_method_of_one_scan,
     named_method,
