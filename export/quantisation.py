@@ -1,7 +1,7 @@
 """Eight-bit models: smaller, faster on processors with integer dot products, not quite the same."""
 
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ from onnxruntime.quantization import (
 
 from derain.errors import InputError
 from derain.sources.frame import Frame
-from derain.views.view import View, ViewedScan
+from derain.views.view import View
 
 # Scans that the ranges of activations are taken from; they are held in memory one at a time.
 CALIBRATION_SCANS = 16
@@ -33,12 +33,11 @@ class CalibrationReader(CalibrationDataReader):  # type: ignore[misc]
 
     def __init__(self, view: View, frames: Sequence[Frame]) -> None:
         # Not a loop, which would hold on to one scan while the next is read.
-        self._views: Iterator[ViewedScan] = (view(frame.read()) for frame in frames)
+        self._inputs = (view(frame.read()).inputs() for frame in frames)
 
     def get_next(self) -> dict[str, NDArray[np.generic]] | None:
         """Inputs of the next scan; None after the last."""
-        view = next(self._views, None)
-        return None if view is None else view.inputs()
+        return next(self._inputs, None)
 
 
 def quantised(

@@ -1,6 +1,7 @@
 """onnxruntime, which comes with derain and runs a model unless another runtime is named."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -38,11 +39,14 @@ class OnnxRuntimeSession(Session):
         options.enable_mem_pattern = False
         # Threads may spin while the network runs; after it, the cores are for the next scan's view.
         options.add_session_config_entry("session.force_spinning_stop", "1")
+        opened = partial(
+            onnxruntime.InferenceSession, file.content, options, providers=["CPUExecutionProvider"]
+        )
         try:
             try:
-                self.session = _opened(file, options)
+                self.session = opened()
             except NoKernel:
-                self.session = _opened(file, options, disabled_optimizers=[WRONG_FUSION])
+                self.session = opened(disabled_optimizers=[WRONG_FUSION])
         except Exception as error:  # onnxruntime's exceptions share no base of their own
             raise self.cannot_run(file, error) from error
 
@@ -59,14 +63,6 @@ class OnnxRuntimeSession(Session):
     def run(self, inputs: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
         """The network's first output."""
         return self.session.run(None, inputs)[0]  # type: ignore[no-any-return]
-
-
-def _opened(file: ModelFile, options: Any, **more: Any) -> Any:
-    import onnxruntime
-
-    return onnxruntime.InferenceSession(
-        file.content, options, providers=["CPUExecutionProvider"], **more
-    )
 
 
 def _type_of(value: Any) -> TensorType:

@@ -1,8 +1,7 @@
 """OpenVINO, which computes in bfloat16 too where the processor does."""
 
 import sys
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from threading import Lock
 from typing import Any
 
@@ -94,24 +93,17 @@ def _type_of(port: Any) -> TensorType:
 def import_openvino() -> Any:
     """Imports OpenVINO where it is needed; nothing else in derain imports it.
 
+    The package openvino-telemetry is kept from being imported meanwhile. OpenVINO depends on it
+    and, with it in place, reports every import of itself over the network unless the user has opted
+    out; without it OpenVINO is content with a stub. Whoever has imported it before has it back
+    afterwards.
+
     Returns:
         The module openvino.
 
     Raises:
         MissingExtraError: OpenVINO is not installed.
         InputError: A library that it links against is missing.
-    """
-    with _without_telemetry():
-        return OPENVINO.load("this runtime")
-
-
-@contextmanager
-def _without_telemetry() -> Iterator[None]:
-    """Keeps the package openvino-telemetry from being imported meanwhile.
-
-    OpenVINO depends on it and, with it in place, reports every import of itself over the network
-    unless the user has opted out; without it OpenVINO is content with a stub. Whoever has imported
-    it before has it back afterwards.
 
     Source: openvino/tools/ovc/__init__.py of OpenVINO 2026.4.1, which sends "general_import".
     """
@@ -120,7 +112,7 @@ def _without_telemetry() -> Iterator[None]:
         del sys.modules[name]
     sys.modules[TELEMETRY] = None  # type: ignore[assignment]  # importing it is an ImportError
     try:
-        yield
+        return OPENVINO.load("this runtime")
     finally:
         del sys.modules[TELEMETRY]
         sys.modules.update(former)
