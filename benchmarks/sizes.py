@@ -17,7 +17,7 @@ import yaml
 
 from derain.cli.main import main as derain
 from derain.export.bench.bench_entries import BenchEntry, bench_entries
-from derain.export.bench.cost import Timing, measure_in_process
+from derain.export.bench.cost import Effort, measure_in_process
 from derain.export.timing import versions
 from derain.files import read_scan, write_scan
 from derain.simulation.sensor import packaged_sensors
@@ -78,7 +78,7 @@ def measured(entry: BenchEntry, frame: Frame, repeats: int) -> tuple[float, floa
         The least milliseconds that a core works on the scan, from file to mask, and the largest
         memory of the process, MiB.
     """
-    memory = measure_in_process(entry, Timing([frame], threads=1, repeats=1)).peak_memory
+    memory = measure_in_process(entry, [frame], Effort(threads=1, repeats=1)).peak_memory
     assert memory is not None, "this system does not measure the largest memory of a process"
     method = entry.ready(1)
     times = []

@@ -17,7 +17,7 @@ from derain.evaluation.counts import ratio
 from derain.evaluation.scores import Scores, score
 from derain.export.bench.bench import scored_methods
 from derain.export.bench.bench_entries import BenchEntry, bench_entries
-from derain.export.bench.cost import Timing, measure_cost
+from derain.export.bench.cost import Effort, measure_cost
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.scan import Scan
 from derain.sources.folders import named_frames
@@ -143,9 +143,9 @@ class Measurement:
 
     def _times(self, found: LabelledFrames, rows: Sequence[BenchEntry]) -> Column:
         """Median milliseconds from the file to the mask, each method in a process of its own."""
-        timing, cells = Timing(found.frames[:1], self.threads, self.repeats), {}
+        effort, cells = Effort(threads=self.threads, repeats=self.repeats), {}
         for row in tqdm(rows, desc="timing", unit="method", disable=None):
-            cost = measure_cost(row, timing)
+            cost = measure_cost(row, found.frames[:1], effort)
             if cost.failure is None:
                 cells[row.title] = Cell(cost.times.percentile(50))
             else:

@@ -40,8 +40,9 @@ from derain.datamodules.labelled import LabelledScans, rain_rates
 from derain.datamodules.scan_data import Part
 from derain.errors import InputError
 from derain.evaluation.published_tables import TABLES, paper_table, scans_by_group
-from derain.export.bench.bench import Bench, Effort, count_in_units, run_bench
+from derain.export.bench.bench import Bench, count_in_units, run_bench
 from derain.export.bench.bench_entries import bench_entries
+from derain.export.bench.cost import Effort
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.export.bench.report import with_published_rows
 from derain.files.atomic import require_writable, write_text

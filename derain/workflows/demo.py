@@ -10,7 +10,8 @@ from derain.datamodules.scan_data import Loading, ScanData
 from derain.default import DEFAULT
 from derain.errors import InputError
 from derain.example import EXAMPLE, Truth
-from derain.export.bench.bench import Bench, Effort, bench
+from derain.export.bench.bench import Bench, bench
+from derain.export.bench.cost import Effort
 from derain.export.bench.report import SHORT, main_table
 from derain.export.methods import load_method, load_method_of_one_scan, named_method
 from derain.files import DEFAULT_COLUMNS

@@ -17,7 +17,7 @@ from derain.cards.rain_found import warn_without_rain
 from derain.errors import reason_of
 from derain.evaluation.scores import ScoredMethod, Scores, score
 from derain.export.bench.bench_entries import BenchEntry, GivenMethod, TimedMethod, bench_entries
-from derain.export.bench.cost import Timing, measure_cost
+from derain.export.bench.cost import Effort, measure_cost
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.export.bench.report import draw_speed_error, main_table, runtimes_table, write_report
 from derain.export.bench.rows import Row, bench_rows
@@ -30,6 +30,7 @@ from derain.filters.point_filter import filter_view, rain_among, rows_of
 from derain.jobs.running import Submits, Task, ValueWork, values
 from derain.scan import Scan
 from derain.sources.folders import GivenScans, source_of
+from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
 from derain.sources.spread import evenly_spaced
 from derain.sources.training_record import training_overlap
@@ -89,23 +90,6 @@ class Bench:
             picture.unlink(missing_ok=True)  # of an earlier bench, which is not this one
             return
         draw_speed_error(self.rows, self.facts, picture)
-
-
-@dataclass(frozen=True)
-class Effort:
-    """The amount of timing, and the seed.
-
-    Attributes:
-        threads: Threads of views and networks; 0 takes every core this process may use.
-        timed: Scans that each method is timed on, at most, spread evenly.
-        repeats: Timed runs on each of them.
-        seed: Random seed of the bootstrap intervals.
-    """
-
-    threads: int = 0
-    timed: int = 10
-    repeats: int = 3
-    seed: int = 0
 
 
 def bench(
@@ -241,9 +225,8 @@ def run_bench(
     notes = [note for method in methods if (note := _overlap(method, data))]
     for note in notes:
         warn(note)
-    timed_on = evenly_spaced(data.frames, effort.timed)
-    in_unit = [frame.with_intensity_times(data.intensity_scale) for frame in timed_on]
-    timing = Timing(in_unit, effort.threads, effort.repeats)
+    timed_on: Sequence[Frame] = evenly_spaced(data.frames, effort.timed)
+    timed_on = [frame.with_intensity_times(data.intensity_scale) for frame in timed_on]
     scores = [Scores(data.card) for _ in methods]
     for of_unit in counted:
         for of_method, counts in zip(scores, of_unit["counts"], strict=True):
@@ -253,14 +236,14 @@ def run_bench(
     rained = any(one.pooled.true_positive + one.pooled.false_negative for one in scores)
     warn_without_rain(rained, data.card)
     costs = [
-        measure_cost(method, timing)
+        measure_cost(method, timed_on, effort)
         for method in tqdm(methods, desc="timing", unit="method", disable=None)
     ]
     notices.warn_of_repeats()
     rows = bench_rows(methods, scores, costs, np.random.default_rng(effort.seed))
     files = [file for of_unit in counted for file in of_unit["files"]]
-    facts = _facts(command, data, timing, effort.seed, methods, files)
-    changed = [_changed(method, timing) for method in methods if method.usual is not None]
+    facts = _facts(command, data, timed_on, effort, methods, files)
+    changed = [_changed(method, timed_on, effort.threads) for method in methods if method.usual]
     return Bench(rows, {**facts, "notes": notes, "runtimes": changed})
 
 
@@ -371,7 +354,7 @@ def _fingerprint(content: object) -> str:
     return sha256(repr(content).encode()).hexdigest()[:16]
 
 
-def _changed(method: BenchEntry, timing: Timing) -> dict[str, Any]:
+def _changed(method: BenchEntry, frames: Sequence[Frame], threads: int) -> dict[str, Any]:
     """Compares a model in another runtime with the same model in onnxruntime.
 
     Returns:
@@ -383,11 +366,11 @@ def _changed(method: BenchEntry, timing: Timing) -> dict[str, Any]:
     changed = {"method": method.title, "runtime": str(method.runtime)}
     assert method.usual is not None
     try:
-        usual, other = method.usual(timing.threads), method.ready(timing.threads)
+        usual, other = method.usual(threads), method.ready(threads)
         assert isinstance(usual, Derainer)
         assert isinstance(other, Derainer)
         # Nothing holds on to a scan while the next one is read.
-        scans = ((frame.name, frame.read()) for frame in timing.frames)
+        scans = ((frame.name, frame.read()) for frame in frames)
         proof = compare_runtimes(usual, other, scans)
     except Exception as error:  # its row states whatever a runtime raises
         return {**changed, "failure": reason_of(error)}
@@ -399,8 +382,8 @@ def _changed(method: BenchEntry, timing: Timing) -> dict[str, Any]:
 def _facts(
     command: str,
     data: LabelledFrames,
-    timing: Timing,
-    seed: int,
+    timed_on: Sequence[Frame],
+    effort: Effort,
     methods: Sequence[BenchEntry],
     files: Sequence[Mapping[str, Any]],
 ) -> dict[str, Any]:
@@ -415,10 +398,10 @@ def _facts(
         "simulated": card.simulated,
         "licence": card.licence,
         "rain": [card.classes[id_] for id_ in card.rain],
-        "seed": seed,
-        "threads": timing.threads,
-        "repeats": timing.repeats,
-        "timed_on": [frame.name for frame in timing.frames],
+        "seed": effort.seed,
+        "threads": effort.threads,
+        "repeats": effort.repeats,
+        "timed_on": [frame.name for frame in timed_on],
         "processor": processor(),
         "system": platform.platform(),
         "versions": versions([DEFAULT_RUNTIME, *others]),

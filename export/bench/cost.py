@@ -18,18 +18,20 @@ from derain.system.workers import without_main_module, worker_pool
 
 
 @dataclass(frozen=True)
-class Timing:
-    """Options for timing methods.
+class Effort:
+    """The amount of timing, and the seed.
 
     Attributes:
-        frames: Scans to time them on, one or more, in the unit of the methods.
-        threads: Threads of view and network; 0 takes every core this process may use.
-        repeats: Timed runs on each scan.
+        threads: Threads of views and networks; 0 takes every core this process may use.
+        timed: Scans that each method is timed on, at most, spread evenly.
+        repeats: Timed runs on each of them.
+        seed: Random seed of the bootstrap intervals.
     """
 
-    frames: Sequence[Frame]
     threads: int = 0
+    timed: int = 10
     repeats: int = 3
+    seed: int = 0
 
 
 @dataclass(frozen=True)
@@ -50,33 +52,35 @@ class Cost:
     alone: bool = True
 
 
-def measure_cost(bench_entry: BenchEntry, timing: Timing) -> Cost:
+def measure_cost(bench_entry: BenchEntry, frames: Sequence[Frame], effort: Effort) -> Cost:
     """Measures a method in a process of its own, or here where it cannot be sent to another.
 
     Args:
         bench_entry: The method.
-        timing: The scans to time it on, and how.
+        frames: Scans to time it on, one or more, in the unit of the methods.
+        effort: Its threads, and the timed runs on each scan.
     """
     try:
         if not bench_entry.is_picklable:
-            return replace(measure_in_process(bench_entry, timing), peak_memory=None, alone=False)
+            here = measure_in_process(bench_entry, frames, effort)
+            return replace(here, peak_memory=None, alone=False)
         with worker_pool(1) as pool:
             with without_main_module():
-                measured = pool.submit(_measure_alone, bench_entry, timing)
+                measured = pool.submit(_measure_alone, bench_entry, frames, effort)
             return measured.result()
     except Exception as error:  # its row states whatever a library raises
         return Cost(RunTimes.of_no_runs(), None, reason_of(error), bench_entry.is_picklable)
 
 
-def measure_in_process(bench_entry: BenchEntry, timing: Timing) -> Cost:
+def measure_in_process(bench_entry: BenchEntry, frames: Sequence[Frame], effort: Effort) -> Cost:
     """Runs a method on every scan, in turns, in this process; see :func:`measure_cost`."""
-    times = timed_runs(bench_entry.ready(timing.threads), timing.frames, timing.repeats)
+    times = timed_runs(bench_entry.ready(effort.threads), frames, effort.repeats)
     return Cost(times, _peak_memory())
 
 
-def _measure_alone(bench_entry: BenchEntry, timing: Timing) -> Cost:
+def _measure_alone(bench_entry: BenchEntry, frames: Sequence[Frame], effort: Effort) -> Cost:
     keep_freed_memory()
-    return measure_in_process(bench_entry, timing)
+    return measure_in_process(bench_entry, frames, effort)
 
 
 def _peak_memory() -> float | None:

@@ -9,7 +9,7 @@ import yaml
 from matplotlib.image import imread
 from recorded_scenes import write_scenes
 
-from derain.export.bench.bench import Effort
+from derain.export.bench.cost import Effort
 from derain.export.bench.report import SHORT
 from derain.files import DEFAULT_COLUMNS, read_scan
 from derain.simulation.campaign import Campaign

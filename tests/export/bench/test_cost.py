@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from derain.export.bench.bench_entries import BenchEntry, bench_entries
-from derain.export.bench.cost import Timing, measure_cost
+from derain.export.bench.cost import Effort, measure_cost
 from derain.export.methods import load_method
 
 
@@ -15,7 +15,7 @@ from derain.export.methods import load_method
 def test_a_process_of_its_own_holds_little_but_the_method(labelled) -> None:
     (row,) = bench_entries(["dsor"])
     held = np.ones(300_000_000, np.uint8)  # in this process, not in that one
-    cost = measure_cost(row, Timing(labelled.frames[:1], threads=1, repeats=1))
+    cost = measure_cost(row, labelled.frames[:1], Effort(threads=1, repeats=1))
     assert cost.alone
     assert len(cost.times.stages["view"]) == 1
     assert held.nbytes / 2**20 > 250 > cost.peak_memory > 20
@@ -23,7 +23,7 @@ def test_a_process_of_its_own_holds_little_but_the_method(labelled) -> None:
 
 def test_a_method_that_cannot_be_timed_states_why(labelled) -> None:
     broken = BenchEntry("broken", "outdet", partial(load_method, "moved.onnx", {}))
-    cost = measure_cost(broken, Timing(labelled.frames, repeats=1))
+    cost = measure_cost(broken, labelled.frames, Effort(repeats=1))
     assert cost.failure.startswith("moved.onnx: no such method or file")
     assert np.isnan(cost.times.percentile(50))
     assert cost.peak_memory is None
