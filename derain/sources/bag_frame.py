@@ -35,11 +35,6 @@ class BagFrame(FileFrame):
     cloud_number: int
 
     @property
-    def suffix(self) -> str:
-        """Empty: there is no file whose format an output could keep."""
-        return ""
-
-    @property
     def folder(self) -> Path:
         """The folder of the copy of its bag, relative to the folder of all results."""
         return Path(self.key).parent.parent

@@ -16,6 +16,7 @@ from derain.example import or_example
 from derain.files import DEFAULT_COLUMNS
 from derain.files.names import scan_stem
 from derain.scan import Scan
+from derain.sources.bag_frame import bag_frames
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame, MemoryFrame
 from derain.sources.records import Records
@@ -30,13 +31,6 @@ FramesOfBag = Callable[[Path, bool, str], Sequence[Frame]]
 
 # Argument of public functions: one item, or several items of any of these kinds.
 GivenScans = Source | Scan | Frame | str | Path | Iterable[Scan | Frame | str | Path]
-
-
-def _clouds_of_bag(bag: Path, labelled: bool, prefix: str) -> Sequence[Frame]:
-    # The reader of bags is imported only when there is a bag.
-    from derain.sources.bag_frame import bag_frames
-
-    return bag_frames(bag, labelled, prefix)
 
 
 def named_frames(
@@ -104,7 +98,7 @@ class FrameFinder:
     recordings: bool = False
     topic: str | None = None
     results: Sequence[Path] = ()
-    frames_of_bag: FramesOfBag = _clouds_of_bag
+    frames_of_bag: FramesOfBag = bag_frames
 
     def frames(self, paths: Sequence[Path]) -> Frames:
         """The scans at paths, in their order; errors as :func:`named_frames` raises them."""
@@ -230,8 +224,6 @@ def frame_of(
         InputError: A bag that cannot be read.
     """
     if split(scan) is not None:
-        from derain.sources.bag_frame import bag_frames
-
         return bag_frames(scan, labelled=True)[0]
     frame = frames_of([scan], partial(label_of, layouts=layouts), columns)[0]
     assert isinstance(frame, FileFrame)

@@ -48,9 +48,9 @@ class Frame(ABC):
         """Its name in messages, such as the path of its file."""
 
     @property
-    @abstractmethod
     def suffix(self) -> str:
         """Suffix of its file's format, such as ``.pcd`` or ``.bin.gz``; empty if it has none."""
+        return ""
 
     @property
     def time(self) -> float | None:
@@ -197,28 +197,18 @@ class MemoryFrame(Frame):
 
     Attributes:
         scan: The scan.
-        seconds: Its time, seconds; None if unknown.
+        time: Time at which it was taken, seconds; None if unknown.
         reads_labels: True if its labels are to be read.
     """
 
     scan: Scan
-    seconds: float | None = None
+    time: float | None = None
     reads_labels: bool = True
 
     @property
     def name(self) -> str:
         """Its name in messages: as its scan is called."""
         return self.scan.name
-
-    @property
-    def suffix(self) -> str:
-        """Nothing: it came from no file."""
-        return ""
-
-    @property
-    def time(self) -> float | None:
-        """Time at which it was taken, as it was given."""
-        return self.seconds
 
     @property
     def has_labels(self) -> bool:
@@ -248,10 +238,8 @@ class MemoryFrame(Frame):
         columns = (self.scan.xyz, self.scan.intensity)
         points = b"".join(np.ascontiguousarray(c).tobytes() for c in columns if c is not None)
         label = self.scan.label if self.has_labels else None
-        label_checksum = (
-            None if label is None else sha256(label.astype("<i8").tobytes()).hexdigest()
-        )
-        return sha256(points).hexdigest(), label_checksum
+        of_label = None if label is None else sha256(label.astype("<i8").tobytes()).hexdigest()
+        return sha256(points).hexdigest(), of_label
 
     def size(self) -> int:
         """Bytes of its coordinates."""

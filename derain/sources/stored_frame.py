@@ -12,6 +12,7 @@ from derain.bags.names import ROS1_SUFFIX, stem
 from derain.errors import InputError
 from derain.files import read_scan
 from derain.scan import Scan
+from derain.sources.bag_frame import bag_frames
 from derain.sources.file_frame import FileFrame
 from derain.sources.records import poses_along
 from derain.sources.trajectory import Trajectory
@@ -103,19 +104,15 @@ class StoredBag(StoredFrame):
     Attributes:
         inner: The topic, as a part of a path; empty if the bag has only one of clouds.
         prefix: First part of the keys of its clouds; empty if the bag is the only one.
-        seconds: Time of the cloud; None for all clouds.
+        time: Time of the cloud, seconds; None for all clouds.
         trajectory: Poses of the clouds, where they are given.
     """
 
     inner: str = ""
     prefix: str = ""
-    seconds: float | None = None
+    time: float | None = None
     trajectory: Trajectory | None = None
-
-    @property
-    def suffix(self) -> str:
-        """Empty: there is no file whose format an output could keep."""
-        return ""
+    suffix = ""  # there is no file whose format an output could keep
 
     @property
     def written_path(self) -> Path:
@@ -123,15 +120,8 @@ class StoredBag(StoredFrame):
         is_ros1 = self.path.suffix.lower() == ROS1_SUFFIX
         return Path(self.prefix).parent / (self.path.name if is_ros1 else stem(self.path))
 
-    @property
-    def time(self) -> float | None:
-        """Time at which the cloud was taken, seconds."""
-        return self.seconds
-
     def fetched(self, where: Mirror) -> list[FileFrame]:
         """Its clouds."""
-        from derain.sources.bag_frame import bag_frames
-
         clouds = bag_frames(where.root / self.path / self.inner, prefix=self.prefix)
         frames: list[FileFrame] = [
             replace(
@@ -160,7 +150,7 @@ class StoredBag(StoredFrame):
             name: Its name in messages.
             seconds: Its time, seconds; None if unknown.
         """
-        return replace(self, key=key, path=path_of(name), seconds=seconds)
+        return replace(self, key=key, path=path_of(name), time=seconds)
 
     def read(self) -> Scan:
         """Refuses: it has several clouds."""

@@ -1,50 +1,24 @@
 """A bag in a folder whose clouds cannot be listed, as a frame that fails as a damaged scan does."""
 
 from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any, NoReturn
 
 from derain.errors import InputError
-from derain.scan import Scan
 from derain.sources.file_frame import FileFrame
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class UnreadableBag(FileFrame):
-    """Stands for all clouds of a bag.
+    """Stands for all clouds of a bag. What reads them, or asks for their labels, raises the error.
 
     Attributes:
         error: Why they cannot be listed.
     """
 
     error: InputError
+    suffix = ""  # there is no file whose format an output could keep
 
-    @property
-    def suffix(self) -> str:
-        """Empty: there is no file whose format an output could keep."""
-        return ""
-
-    def require_labels(self) -> None:
-        """Raises the error: whether there are labels is not known."""
+    def _fail(self, *_: Any, **__: Any) -> NoReturn:
         raise self.error
 
-    def read(self) -> Scan:
-        """Raises the error."""
-        raise self.error
-
-    def read_label(self, points: int) -> NDArray[np.int64]:
-        """Raises the error."""
-        raise self.error
-
-    def count_points(self) -> int:
-        """Raises the error."""
-        raise self.error
-
-    def fingerprint(self) -> str:
-        """Raises the error."""
-        raise self.error
-
-    def checksums(self) -> tuple[str, str | None]:
-        """Raises the error."""
-        raise self.error
+    read = read_label = count_points = fingerprint = checksums = require_labels = _fail

@@ -36,7 +36,7 @@ def drives(*lengths: int) -> Frames:
                     sequence=f"{sequence}",
                     number=place,
                     scan=Scan.of(points).with_label(np.resize([0, 110], 30)),
-                    seconds=number / 10,
+                    time=number / 10,
                     sensor_to_world=np.diag([1.0, 1, 1, 1]) * (number + 1),
                 )
             )

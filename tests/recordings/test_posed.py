@@ -78,7 +78,7 @@ def test_a_scan_taken_before_the_one_that_it_follows_is_not_trusted(drive) -> No
     odometry = FrameOdometry()
     times = (0.0, 0.1, 0.1, 0.05)
     found = [
-        odometry.register(replace(frame, seconds=time), frame.read())
+        odometry.register(replace(frame, time=time), frame.read())
         for frame, time in zip(drive, times, strict=True)
     ]
     assert [each.trusted for each in found] == [True, True, False, False]
@@ -100,7 +100,7 @@ def test_poses_of_a_file_go_line_by_line_or_by_number(drive, tmp_path) -> None:
 def test_poses_of_a_file_go_by_time_where_both_have_one(drive, tmp_path) -> None:
     path = tmp_path / "mine.tum"
     path.write_text("0.95 0 0 0 0 0 0 1\n1.45 5 0 0 0 0 0 1\n")
-    timed = [replace(frame, seconds=1 + frame.number / 10) for frame in drive]
+    timed = [replace(frame, time=1 + frame.number / 10) for frame in drive]
     assert x_of(with_poses(timed, path)) == [0.5, 1.5, 2.5, 3.5]
     path.write_text("".join(f"{n} {n} 0 0 0 0 0 1\n" for n in range(4)))
     assert x_of(with_poses(drive, path)) == [0, 1, 2, 3]

@@ -110,7 +110,7 @@ def test_a_pose_that_is_no_rigid_motion_is_refused(labelled, pose) -> None:
 
 def test_a_scan_in_memory_is_a_frame_like_any(labelled) -> None:
     scan = Scan.of(scene(50), "mine").with_label(labelled.read_label(50))
-    frame = MemoryFrame(key="0", scan=scan, seconds=1.5)
+    frame = MemoryFrame(key="0", scan=scan, time=1.5)
     assert (frame.name, frame.suffix, frame.time, frame.count_points()) == ("mine", "", 1.5, 50)
     assert frame.pose is None
     assert frame.read().label is None

@@ -17,7 +17,7 @@ def frames(*lengths: int) -> list[MemoryFrame]:
     """Sequences of so many frames, one after the other, each taken at its place in all of them."""
     pairs = [(name, number) for name, length in enumerate(lengths) for number in range(length)]
     return [
-        MemoryFrame(key="", sequence=str(name), number=number, scan=SCAN, seconds=place)
+        MemoryFrame(key="", sequence=str(name), number=number, scan=SCAN, time=place)
         for place, (name, number) in enumerate(pairs)
     ]
 

@@ -16,7 +16,7 @@ SEVERAL = Window(1, 1)
 def frames(*seconds: float | None, sequence: str = "drive") -> list[Frame]:
     scan = Scan.of(scene(10), name="scan")
     return [
-        MemoryFrame(key=f"{n}", sequence=sequence, number=n, scan=scan, seconds=time)
+        MemoryFrame(key=f"{n}", sequence=sequence, number=n, scan=scan, time=time)
         for n, time in enumerate(seconds)
     ]
 
