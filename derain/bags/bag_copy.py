@@ -34,16 +34,11 @@ class BagCopy:
         reader = self._stack.enter_context(bag.opened())
         self._messages = bag.messages_of(reader)
         self._clouds = 0
+        self.path = folder / written_name(bag)
         with self._writing():
-            self._writer = _writer(bag, reader, folder / written_name(bag))
+            self._writer = _writer(bag, reader, self.path)
             for connection in reader.connections:  # as many, and in the same order
                 self._writer.connection(connection)
-
-    @property
-    def path(self) -> Path:
-        """The copy: a file of ROS 1, a folder of ROS 2."""
-        path: Path = self._writer.path
-        return path
 
     def forward_to(self, number: int) -> Message:
         """Copies the messages before one of the clouds.

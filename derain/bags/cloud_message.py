@@ -64,17 +64,13 @@ class CloudMessage:
         read.take(STAMP_AT[encoding] - read.position + 8)  # the stamp
         read.string()  # the frame
         head = message[: read.position]
-        height, width = read.number("I"), read.number("I")
-        fields = tuple(
-            PointField(read.string(), read.number("I"), read.number("B"), read.number("I"))
-            for _ in range(read.number("I"))
-        )
-        is_bigendian = bool(read.number("B"))
-        point_step, row_step = read.number("I"), read.number("I")
-        data = read.take(read.number("I"))
-        is_dense = bool(read.number("B"))
+        height, width, count = read.numbers("III")
+        fields = tuple(PointField(read.string(), *read.numbers("IBI")) for _ in range(count))
+        bigendian, point_step, row_step, size = read.numbers("BIII")
+        data = read.take(size)
+        (dense,) = read.numbers("B")
         cloud = PointCloud(
-            height, width, fields, is_bigendian, point_step, row_step, data, is_dense
+            height, width, fields, bool(bigendian), point_step, row_step, data, bool(dense)
         )
         tail = message[read.position :]
         return cls(encoding, head, cloud, tail, stamp)
@@ -86,20 +82,13 @@ class CloudMessage:
     def to_bytes(self) -> bytes:
         """The bytes of the message."""
         cloud, write = self.cloud, _Writer(self.head, self.encoding)
-        write.number("I", cloud.height)
-        write.number("I", cloud.width)
-        write.number("I", len(cloud.fields))
+        write.numbers("III", cloud.height, cloud.width, len(cloud.fields))
         for field in cloud.fields:
             write.string(field.name)
-            write.number("I", field.offset)
-            write.number("B", field.datatype)
-            write.number("I", field.count)
-        write.number("B", cloud.is_bigendian)
-        write.number("I", cloud.point_step)
-        write.number("I", cloud.row_step)
-        write.number("I", len(cloud.data))
+            write.numbers("IBI", field.offset, field.datatype, field.count)
+        write.numbers("BIII", cloud.is_bigendian, cloud.point_step, cloud.row_step, len(cloud.data))
         write.message += cloud.data
-        write.number("B", cloud.is_dense)
+        write.numbers("B", cloud.is_dense)
         write.message += self.tail
         return bytes(write.message)
 
@@ -137,14 +126,17 @@ class _Reader:
         self.encoding = encoding
         self.position = 0
 
-    def number(self, kind: str) -> int:
-        layout = struct.Struct("<" + kind)
-        self.position = _aligned(self.position, layout.size, self.encoding)
-        (value,) = layout.unpack(self.take(layout.size))
-        return int(value)
+    def numbers(self, kinds: str) -> list[int]:
+        values: list[int] = []
+        for kind in kinds:
+            layout = struct.Struct("<" + kind)
+            self.position = _aligned(self.position, layout.size, self.encoding)
+            values += layout.unpack(self.take(layout.size))
+        return values
 
     def string(self) -> str:
-        text = bytes(self.take(self.number("I")))
+        (size,) = self.numbers("I")
+        text = bytes(self.take(size))
         if self.encoding == CDR and text:
             if text[-1]:
                 raise ValueError("a text in it does not end as CDR requires")
@@ -165,12 +157,13 @@ class _Writer:
         self.message = bytearray(head)
         self.encoding = encoding
 
-    def number(self, kind: str, value: int) -> None:
-        layout = struct.Struct("<" + kind)
-        place = _aligned(len(self.message), layout.size, self.encoding)
-        self.message += bytes(place - len(self.message)) + layout.pack(value)
+    def numbers(self, kinds: str, *values: int) -> None:
+        for kind, value in zip(kinds, values, strict=True):
+            layout = struct.Struct("<" + kind)
+            place = _aligned(len(self.message), layout.size, self.encoding)
+            self.message += bytes(place - len(self.message)) + layout.pack(value)
 
     def string(self, text: str) -> None:
         content = text.encode(*TEXT) + (b"\0" if self.encoding == CDR else b"")
-        self.number("I", len(content))
+        self.numbers("I", len(content))
         self.message += content

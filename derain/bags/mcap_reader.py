@@ -114,17 +114,18 @@ class McapFile:
             )
         return found
 
-    def messages(self, channels: Container[int], start: int | None = None) -> Iterator[Message]:
+    def messages(self, channels: Container[int], start: int = 0) -> Iterator[Message]:
         """Messages in the order of their times; of one time, in the order of the file.
 
         Args:
-            channels: Those of interest.
-            start: The first time of interest, nanoseconds; None for the beginning.
+            channels: Those of interest. Where they are all, no message may be left out.
+            start: The first time of interest, nanoseconds.
 
         Raises:
             ValueError: A damaged file.
         """
-        parts = self._in_chunks(channels, start or 0), self._outside_chunks(channels, start or 0)
+        whole = all(number in channels for number in self.channels)
+        parts = (part(channels, start, whole) for part in (self._in_chunks, self._outside_chunks))
         for _, _, message in heapq.merge(*parts, key=lambda found: found[:2]):
             yield message
 
@@ -204,10 +205,9 @@ class McapFile:
             raise ValueError(f"it defines {type(record).__name__.lower()} {record.id} in two ways")
 
     def _in_chunks(
-        self, channels: Container[int], start: int
+        self, channels: Container[int], start: int, whole: bool
     ) -> Iterator[tuple[int, int, Message]]:
         """Time, chunk and message; a chunk is unpacked when its time has come."""
-        whole = self._are_all(channels)
         waiting: list[tuple[int, int, int, Message | None]] = [
             (chunk.start, chunk.offset, -1, None)
             for chunk in self.chunks
@@ -240,10 +240,9 @@ class McapFile:
                 )
 
     def _outside_chunks(
-        self, channels: Container[int], start: int
+        self, channels: Container[int], start: int, whole: bool
     ) -> Iterator[tuple[int, int, Message]]:
         """Time, place and message of those that are in no chunk."""
-        whole = self._are_all(channels)
         for index in np.argsort(np.asarray(self._times), kind="stable"):
             if self._times[index] >= start:
                 offset = self._offsets[index]
@@ -252,10 +251,6 @@ class McapFile:
                     yield message.log_time, offset, message
                 elif whole:
                     raise _undefined(message)
-
-    def _are_all(self, channels: Container[int]) -> bool:
-        """True if all channels are of interest, so that no message may be left out."""
-        return all(number in channels for number in self.channels)
 
 
 @dataclass(frozen=True, eq=False)
@@ -313,7 +308,7 @@ class McapReader:
         for file in self.files:
             of_file = file.connections()
             channels = {n: wanted[each] for n, each in of_file.items() if each in wanted}
-            for found in file.messages(channels, start):
+            for found in file.messages(channels, start or 0):
                 connection = channels[found.channel_id]
                 yield connection, found.log_time, found.data, found.publish_time, found.sequence
 
@@ -326,11 +321,6 @@ class McapReader:
         for file in self.files:
             file.check_whole()
         return self.message_count
-
-    def private_records(self) -> Iterator[bytes]:
-        """Records of kinds that MCAP leaves to applications, byte for byte."""
-        for file in self.files:
-            yield from file.records.private()
 
     def attachments_and_metadata(self) -> Iterator[Attachment | Metadata]:
         """Every record that is neither a message nor about messages.

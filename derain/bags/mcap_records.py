@@ -219,13 +219,7 @@ def _message(body: bytes | memoryview) -> records.Message:
     if len(body) < MESSAGE_HEAD.size:
         raise ValueError("a message is cut off")
     channel, sequence, time, published = MESSAGE_HEAD.unpack_from(body)
-    return records.Message(
-        channel_id=channel,
-        log_time=time,
-        data=bytes(body[MESSAGE_HEAD.size :]),
-        publish_time=published,
-        sequence=sequence,
-    )
+    return records.Message(channel, time, bytes(body[MESSAGE_HEAD.size :]), published, sequence)
 
 
 def _check_crc(what: str, stated: int, parts: Iterable[bytes]) -> None:

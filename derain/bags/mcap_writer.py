@@ -50,17 +50,14 @@ class McapWriter:
         self._file = (path / f"{path.name}.mcap").open("xb")
         chunks = [chunk for file in bag.files for chunk in file.chunks]
         used = {chunk.compression for chunk in chunks}
+        kinds = [kind for kind in CompressionType if kind.name.lower() in used]
         self._writer: Any = Writer(
             self._file,
-            compression=next(
-                (kind for kind in CompressionType if kind.name.lower() in used),
-                CompressionType.NONE,
-            ),
+            compression=kinds[0] if kinds else CompressionType.NONE,
             use_chunking=bool(chunks) or not bag.message_count,
         )
-        profiles = [file.records.profile for file in bag.files]
-        self._writer.start(profiles[0] if profiles else "ros2")
-        self._schemas: dict[object, int] = {}
+        self._writer.start(bag.files[0].records.profile)
+        self._schemas: dict[object, int] = {None: 0}
         self._channels: dict[McapConnection, int] = {}
         self._counts: dict[McapConnection, int] = {}
         self._first, self._last = 2**63 - 1, 0
@@ -69,13 +66,10 @@ class McapWriter:
         """A connection of this bag; see :meth:`RosbagsWriter.connection`."""
         new = replace(like, topic=topic or like.topic, msgcount=0)
         if new not in self._channels:
-            number = 0
-            if new.schema is not None:
-                if new.schema not in self._schemas:
-                    self._schemas[new.schema] = self._writer.register_schema(*new.schema)
-                number = self._schemas[new.schema]
+            if new.schema is not None and new.schema not in self._schemas:
+                self._schemas[new.schema] = self._writer.register_schema(*new.schema)
             self._channels[new] = self._writer.register_channel(
-                new.topic, new.encoding, number, dict(new.notes)
+                new.topic, new.encoding, self._schemas[new.schema], dict(new.notes)
             )
             self._counts[new] = 0
         return new
@@ -101,8 +95,8 @@ class McapWriter:
         metadata = self._metadata()
         text = yaml.safe_dump(metadata.content, sort_keys=False)
         self._writer.add_metadata(ROS2_RECORD, {ROS2_NOTE: text})
-        for private in self.bag.private_records():  # the library writes none
-            self._file.write(private)
+        for file in self.bag.files:
+            self._file.writelines(file.records.private())  # the library writes none
         self._writer.finish()
         self._file.close()
         if self._compression == FILE:

@@ -135,11 +135,7 @@ class PointCloud:
         if not named or not len(self):
             return {f.name: np.empty((0, *f.dtype("=").shape), f.dtype("=").base) for f in named}
         points = self._points.view(table)[:, 0]
-        columns = {name: points[name] for name in table.names or ()}
-        return {
-            name: column.astype(column.dtype.newbyteorder("="), copy=False)
-            for name, column in columns.items()
-        }
+        return {f.name: points[f.name].astype(f.dtype("=").base, copy=False) for f in named}
 
     def take(self, rows: NDArray[np.bool_]) -> Self:
         """Some of its points only, every byte of each as it was, as an unorganised cloud.
@@ -176,8 +172,6 @@ class PointCloud:
         by_name = {field.name: field for field in self.fields}
         for axis in AXES:
             if (field := named(by_name, axis, "the cloud")) is not None:
-                if field.datatype not in (FLOAT32_DATATYPE, 8):
-                    raise ValueError(f"field '{field.name}' cannot hold what is no number")
                 values: NDArray[Any] = np.ndarray(
                     (self.height, self.width),
                     field.dtype(self._order),
