@@ -5,10 +5,10 @@ import math
 import zlib
 from collections import defaultdict
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from pathlib import PurePosixPath
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -73,7 +73,8 @@ class ScanOutcome:
         issues: Warnings about it.
         cleaned: Its results; None if it could not be cleaned.
         seconds: Its time, seconds; None if unknown.
-        packed: The weather in the scan, as text; None if it was not measured.
+        packed: The weather in the scan, as text, for its numbers take 100 kB and many outcomes may
+            wait at once; None if it was not measured.
         error: The error of a scan that could not be cleaned; None if it was cleaned.
         recording: The unbroken recording that it is of, where only its unit shows that.
         uploaded: Sizes and versions of what its unit uploaded, by path, with the last scan of it.
@@ -98,10 +99,6 @@ class ScanOutcome:
     def measured(self) -> ScanWeather | None:
         """The weather in the scan; None if it was not measured."""
         return None if self.packed is None else unpacked(self.packed)
-
-    def with_weather(self, weather: WeatherRecord | None) -> Self:
-        """The same, whose figures have those of the weather."""
-        return replace(self, cleaned=replace(self.figures, weather=weather))
 
     def to_json(self) -> dict[str, Any]:
         """The outcome of a cleaned scan as the record of its unit has it."""

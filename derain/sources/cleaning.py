@@ -173,7 +173,7 @@ def clean(
                 opened.count()
             if (measured := outcome.measured) is not None:
                 record = monitor.add(outcome.frame, measured, outcome.recording)
-                outcome = outcome.with_weather(record)
+                outcome = replace(outcome, cleaned=replace(outcome.figures, weather=record))
             if result.before:
                 observer.found(outcome)
             else:

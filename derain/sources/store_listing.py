@@ -64,7 +64,7 @@ def frames_at(
         listing = _Listing(local, (stored for url in urls for stored in listed(url)))
         stored = tuple(local.path_of(str(folder)) for folder in results if is_url(folder))
         finder = FrameFinder(columns, topic=topic, results=stored, frames_of_bag=listing.bag)
-        return listing.stored(finder.frames([local.path_of(url) for url in urls]))
+        return finder.frames([local.path_of(url) for url in urls]).map(listing.stored)
 
 
 class _Listing:
@@ -78,7 +78,6 @@ class _Listing:
 
     def __init__(self, local: Mirror, objects: Iterable[StoredObject]) -> None:
         self._local = local
-        self._root = local.root
         self._stamps: dict[Path, str] = {}
         stored = [(each.path, each) for each in objects]
         self._objects = {path: each for path, each in stored if not _is_hidden(path)}
@@ -92,8 +91,8 @@ class _Listing:
         found = split(path)
         assert found is not None
         place, inner = found
-        bag = place.relative_to(self._root)
-        files = [file.relative_to(self._root) for file in files_of(place)]
+        bag = place.relative_to(self._local.root)
+        files = [file.relative_to(self._local.root) for file in files_of(place)]
         return [
             StoredBag(
                 key=prefix or stem(bag),
@@ -105,15 +104,12 @@ class _Listing:
             )
         ]
 
-    def stored(self, frames: Iterable[Frame]) -> Frames:
-        """Frames of the mirror as frames of their stores, for which the mirror is not needed."""
-        return Frames(map(self._stored_frame, frames))
-
-    def _stored_frame(self, frame: Frame) -> Frame:
+    def stored(self, frame: Frame) -> Frame:
+        """A frame of the mirror as one of its store, for which the mirror is not needed."""
         if isinstance(frame, StoredBag):
             return frame
         assert isinstance(frame, FileFrame)
-        path = frame.path.relative_to(self._root)
+        path = frame.path.relative_to(self._local.root)
         return StoredScan(
             key=frame.key,
             sequence=frame.sequence,

@@ -96,12 +96,9 @@ class UnitJudging(Work[FrameUnit, ResultT]):
         """The unit with poses, and the issues of the poses, by the keys of the frames."""
         if self.placing is None:
             return unit, {}
-        issues = {}
-        frames = []
-        for frame, odd in self.placing(unit.frames):
-            frames.append(frame)
-            issues[frame.key] = odd
-        return replace(unit, frames=tuple(frames)), issues
+        placed = list(self.placing(unit.frames))
+        frames = tuple(frame for frame, _ in placed)
+        return replace(unit, frames=frames), {frame.key: odd for frame, odd in placed}
 
     def options(self, command: str, source: Sequence[Frame], block: int) -> dict[str, Any]:
         """The options that the answers depend on besides the scans, for the job of a command.
