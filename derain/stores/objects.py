@@ -37,11 +37,13 @@ VERSIONS = (
     "created",
 )
 
-# Errors that the next try would meet again. Those of botocore are known by name, for it may not be
-# installed.
-FINAL = (PermissionError, IsADirectoryError, NotImplementedError, InputError)
+# Errors that the next try would meet again; and those of botocore that refuse access, by their
+# names, for it may not be installed.
+FINAL = (IsADirectoryError, NotImplementedError)
+REFUSALS = ("NoCredentialsError", "PartialCredentialsError", "ProfileNotFound")
+
+# The status of an answer of a web server after which another request may succeed.
 TOO_MANY_REQUESTS = 429
-FINAL_NAMES = ("NoCredentialsError", "PartialCredentialsError", "ProfileNotFound")
 
 Result = TypeVar("Result")
 
@@ -157,9 +159,11 @@ def tried(url: str, request: Callable[[], Result]) -> Result:
         try:
             return request()
         except Exception as error:  # each library of a store raises its own kinds
-            if wait is None or _is_final(url, error):
-                # From None: what the library's error holds may be secret.
-                raise _refusal(url, error) from None
+            # From None: what the library's error holds may be secret.
+            if refusal := _refusal(url, error):
+                raise refusal from None
+            if wait is None:
+                raise _failed(url, error, f" {len(WAITS) + 1} times") from None
             time.sleep(wait * random.uniform(0.5, 1))
     raise AssertionError("the last try has no wait")
 
@@ -223,17 +227,25 @@ def _fetch(file: Path, stored: StoredObject) -> None:
     tried(stored.url, get)
 
 
-def _is_final(url: str, error: Exception) -> bool:
-    if _is_full(error):
-        return True
+def _refusal(url: str, error: Exception) -> InputError | None:
+    """What a user is told of an error that the next try would meet again; None of any other."""
+    if isinstance(error, InputError):
+        return error
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return InputError(
+            without_secrets(url),
+            f"there is no room for a copy in {gettempdir()}",
+            "Free space there, or name another folder in TMPDIR.",
+        )
     if isinstance(error, FileNotFoundError):
-        return not is_web(url) or _is_missing(error)
-    return isinstance(error, FINAL) or type(error).__name__ in FINAL_NAMES
-
-
-def _is_full(error: Exception) -> bool:
-    """True if there is no room for a copy on this machine."""
-    return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
+        return _missing(url) if not is_web(url) or _is_missing(error) else None
+    if isinstance(error, PermissionError) or type(error).__name__ in REFUSALS:
+        return InputError(
+            without_secrets(url),
+            f"the store refuses access ({_reason(error)})",
+            "Check the credentials that its library finds in the environment.",
+        )
+    return _failed(url, error) if isinstance(error, FINAL) else None
 
 
 def _is_missing(error: FileNotFoundError) -> bool:
@@ -246,29 +258,15 @@ def _missing(url: str) -> InputError:
     return InputError(without_secrets(url), "there is no such object or folder", "Check the URL.")
 
 
-def _refusal(url: str, error: Exception) -> InputError:
-    if isinstance(error, InputError):
-        return error
-    if _is_full(error):
-        return InputError(
-            without_secrets(url),
-            f"there is no room for a copy in {gettempdir()}",
-            "Free space there, or name another folder in TMPDIR.",
-        )
-    if isinstance(error, FileNotFoundError):
-        if _is_final(url, error):
-            return _missing(url)
-        cause = error.__cause__
-        error = cause if isinstance(cause, Exception) else error
-    reason = without_secrets(f"{type(error).__name__}: {reason_of(error)}")
-    if isinstance(error, PermissionError) or type(error).__name__ in FINAL_NAMES:
-        return InputError(
-            without_secrets(url),
-            f"the store refuses access ({reason})",
-            "Check the credentials that its library finds in the environment.",
-        )
+def _failed(url: str, error: Exception, tries: str = "") -> InputError:
     return InputError(
         without_secrets(url),
-        f"a request failed {len(WAITS) + 1} times ({reason})",
+        f"a request failed{tries} ({_reason(error)})",
         "Check the store, then run the same command again.",
     )
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, FileNotFoundError) and isinstance(error.__cause__, Exception):
+        error = error.__cause__
+    return without_secrets(f"{type(error).__name__}: {reason_of(error)}")
