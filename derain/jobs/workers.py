@@ -9,7 +9,7 @@ from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
 from multiprocessing.connection import Connection
 from queue import SimpleQueue
-from typing import Any, Self, TypeVar
+from typing import Any, TypeVar
 
 from derain.errors import InputError
 from derain.system.memory import keep_freed_memory
@@ -53,9 +53,6 @@ class WorkerPool(ThreadPoolExecutor):
     def submit(self, work: Callable[..., Result], /, *args: Any, **kwargs: Any) -> Future[Result]:
         """Runs a function in the next process that is idle."""
         return super().submit(self._run, pickle.dumps((work, args, kwargs)))
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is not None:
