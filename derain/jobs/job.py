@@ -62,20 +62,22 @@ class Job:
         Raises:
             InputError: The folder is of a job with other options, or cannot be written.
         """
-        # JSON turns tuples into lists: compare options as they are read back.
-        ours = cls(
-            folder,
-            json.loads(json.dumps(options)),
-            None if shard is None else (shard.count, shard.first),
-        )
+        documents = documents_at(folder, FOLDER)
         if anew:
-            ours._documents.remove_all()
-        written = {"options": ours.options, "shards": ours.shards}
-        ours._documents.create(JOB, json.dumps(written, indent=1))
+            documents.remove_all()
+        shards = None if shard is None else (shard.count, shard.first)
+        written = json.dumps({"options": options, "shards": shards}, indent=1)
+        documents.create(JOB, written)
         begun = cls.at(folder)  # another command may have been quicker
-        ours._refuse_other(begun)
+        # JSON turns tuples into lists: compare options as they are read back.
+        if changed := differences(begun.options, json.loads(written)["options"]):
+            raise InputError(
+                without_secrets(str(folder)),
+                f"was started with other options: {changed}",
+                "Give --out another folder, or --anew to do all of it again.",
+            )
         listed = [[unit.id, unit.size, unit.inputs] for unit in units]
-        begun._documents.write(UNITS, json.dumps(listed))
+        documents.write(UNITS, json.dumps(listed))
         return begun
 
     @classmethod
@@ -169,15 +171,6 @@ class Job:
     @property
     def _documents(self) -> Documents:
         return documents_at(self.folder, FOLDER)
-
-    def _refuse_other(self, begun: "Job") -> None:
-        """Refuses to resume a job that was started with other options."""
-        if changed := differences(begun.options, self.options):
-            raise InputError(
-                without_secrets(str(self.folder)),
-                f"was started with other options: {changed}",
-                "Give --out another folder, or --anew to do all of it again.",
-            )
 
 
 @dataclass(frozen=True)

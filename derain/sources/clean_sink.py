@@ -70,9 +70,14 @@ class CleanSink:
         self._source = source
         removed_folder = None if removed is None else _path_of(removed)
         self._files = FolderSink(self.folder, again=False, removed=removed_folder)
-        for frame in source:
-            if isinstance(frame, StoredBag):
-                self._refuse_own_bag(frame)
+        stored = (frame for frame in source if isinstance(frame, StoredBag))
+        self._stored_bags: dict[Frame, Path] = {}
+        for bag in stored:
+            target = self._stored_bags[bag] = self.folder / bag.written_path
+            if target in (bag.path, bag.path.parent) or target.is_relative_to(bag.path):
+                raise InputError(
+                    url_of(self.folder), f"would overwrite {bag.name}", "Give --out another folder."
+                )
         self._files.refuse_clashes(source)
         self._bags = CleanedBags(self.folder, source, bags, probability)
         self._refuse_files_in_bags()
@@ -95,12 +100,10 @@ class CleanSink:
 
     def targets(self) -> Iterator[Path]:
         """Every file and bag that it may write."""
+        yield from (*self._stored_bags.values(), *self._bags.targets())
         for frame in self._source:
-            if isinstance(frame, StoredBag):
-                yield self.folder / frame.written_path
-            elif not self._bags.takes(frame):
+            if not self._is_in_bag(frame):
                 yield from self._files.files_of(frame)
-        yield from self._bags.targets()
 
     def write(self, judgement: Judgement) -> None:
         """Writes a scan without its rain.
@@ -159,12 +162,11 @@ class CleanSink:
         return f"{' and '.join(counts)} are written, each of them whole"
 
     def _is_in_bag(self, frame: Frame) -> bool:
-        return isinstance(frame, StoredBag) or self._bags.takes(frame)
+        return frame in self._stored_bags or self._bags.takes(frame)
 
     def _refuse_files_in_bags(self) -> None:
         """Refuses a scan in a file whose result would be in the folder of a bag's copy."""
-        stored = (frame for frame in self._source if isinstance(frame, StoredBag))
-        bags = {self.folder / bag.written_path for bag in stored} | {*self._bags.targets()}
+        bags = {*self._stored_bags.values(), *self._bags.targets()}
         if not bags:
             return
         for frame in self._source:
@@ -175,13 +177,6 @@ class CleanSink:
                     f"its result would be in {url_of(bag)}, where a bag of that name is written",
                     "Take them in two runs, each to its --out.",
                 )
-
-    def _refuse_own_bag(self, bag: StoredBag) -> None:
-        target = self.folder / bag.written_path
-        if target in (bag.path, bag.path.parent) or target.is_relative_to(bag.path):
-            raise InputError(
-                url_of(self.folder), f"would overwrite {bag.name}", "Give --out another folder."
-            )
 
 
 @dataclass(frozen=True)
@@ -203,7 +198,7 @@ class Destination:
     @property
     def is_stored(self) -> bool:
         """True if it is in an object store, even in part."""
-        return is_url(self.folder) or (self.removed is not None and is_url(self.removed))
+        return is_url(self.folder) or is_url(self.removed)
 
     @contextmanager
     def opened(self, source: Source) -> Iterator[tuple[CleanSink, dict[str, str]]]:
@@ -232,11 +227,8 @@ class Destination:
         Raises:
             InputError: A store that cannot be reached.
         """
-        found: dict[str, str] = {}
-        for place in (self.folder, self.removed):
-            if place is not None and is_url(place):
-                found |= stamps_at(str(place))
-        return found
+        urls = [str(place) for place in (self.folder, self.removed) if is_url(place)]
+        return {path: stamp for url in urls for path, stamp in stamps_at(url).items()}
 
     def holds(self, source: Source) -> bool:
         """True if all result files of the scans exist; files in stores are not checked.

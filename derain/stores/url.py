@@ -13,7 +13,7 @@ Place = Path | str
 SCHEME = r"[A-Za-z][A-Za-z0-9+.-]+"
 
 
-def is_url(place: Place) -> bool:
+def is_url(place: Place | None) -> bool:
     """True if a place is a URL such as ``s3://bucket/drives``."""
     return isinstance(place, str) and re.match(f"{SCHEME}://", place) is not None
 
