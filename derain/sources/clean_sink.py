@@ -1,5 +1,6 @@
 """Scans without their rain: files in a folder, and rewritten bags."""
 
+import os
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass
@@ -7,12 +8,15 @@ from pathlib import Path
 from typing import Self
 
 from derain.errors import InputError
+from derain.files import write_scan
 from derain.files.atomic import require_writable_folder
 from derain.files.columns import with_column
 from derain.files.format import format_of
+from derain.files.labels import LABEL
 from derain.scan import Scan
 from derain.sources.bag_frame import BagFrame
 from derain.sources.cleaned_bags import RAIN_PROBABILITY, BagOptions, CleanedBags
+from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
@@ -68,8 +72,8 @@ class CleanSink:
         self.probability = probability
         self.options = {"removed": removed is not None, "probability": probability, **asdict(bags)}
         self._source = source
-        removed_folder = None if removed is None else _path_of(removed)
-        self._files = FolderSink(self.folder, again=False, removed=removed_folder)
+        self._files = FolderSink(self.folder, again=False)
+        self._removed = None if removed is None else FolderSink(_path_of(removed), "--removed")
         stored = (frame for frame in source if isinstance(frame, StoredBag))
         self._stored_bags: dict[Frame, Path] = {}
         for bag in stored:
@@ -81,18 +85,13 @@ class CleanSink:
         self._files.refuse_clashes(source)
         self._bags = CleanedBags(self.folder, source, bags, probability)
         self._refuse_files_in_bags()
-        in_bag = next(filter(self._is_in_bag, source), None)
-        if removed is not None and in_bag is not None:
-            raise InputError(
-                "--removed",
-                f"is a folder for files, and {in_bag.name} is in a bag",
-                "Give --removed-topic NAME.",
-            )
+        if self._removed is not None:
+            self._refuse_removed(self._removed)
         self._written = self._written_for_it = 0
 
     def __enter__(self) -> Self:
-        for folder in filter(None, (self._files.folder, self._files.removed)):
-            require_writable_folder(folder)
+        for sink in filter(None, (self._files, self._removed)):
+            require_writable_folder(sink.folder)
         return self
 
     def __exit__(self, kind: object, *_: object) -> None:
@@ -103,7 +102,9 @@ class CleanSink:
         yield from (*self._stored_bags.values(), *self._bags.targets())
         for frame in self._source:
             if not self._is_in_bag(frame):
-                yield from self._files.files_of(frame)
+                yield from (self._files.scan_path(frame), self._files.path(frame, LABEL))
+                if self._removed is not None:
+                    yield self._removed.scan_path(frame)
 
     def write(self, judgement: Judgement) -> None:
         """Writes a scan without its rain.
@@ -125,8 +126,9 @@ class CleanSink:
             self._bags.write(judgement)
             return
         scan = _with_probability(frame, judgement) if self.probability else judgement.scan
-        removed = None if self._files.removed is None else scan.take(rain)
-        self._files.write(frame, scan.take(~rain), rain, removed)
+        if self._removed is not None:
+            write_scan(self._removed.scan_path(frame), scan.take(rain))
+        self._files.write(frame, scan.take(~rain), rain)
         self._written += 1
 
     def finish_bags(self, given: Sequence[Frame]) -> Iterator[tuple[Frame, InputError]]:
@@ -163,6 +165,18 @@ class CleanSink:
 
     def _is_in_bag(self, frame: Frame) -> bool:
         return frame in self._stored_bags or self._bags.takes(frame)
+
+    def _refuse_removed(self, removed: FolderSink) -> None:
+        """Refuses a folder of removed points where they are in bags, or would take a place."""
+        if os.path.realpath(removed.folder) == os.path.realpath(self.folder):
+            reason = "--removed is the folder of --out, where the cleaned scans go"
+            raise InputError(url_of(removed.folder), reason, "Give it another one.")
+        for frame in self._source:
+            if self._is_in_bag(frame):
+                reason = f"is a folder for files, and {frame.name} is in a bag"
+                raise InputError("--removed", reason, "Give --removed-topic NAME.")
+            if isinstance(frame, FileFrame):
+                removed.refuse_own_scan(frame)
 
     def _refuse_files_in_bags(self) -> None:
         """Refuses a scan in a file whose result would be in the folder of a bag's copy."""

@@ -26,14 +26,10 @@ class FolderSink:
         folder: The folder, made if missing.
         option: The user's name for it, for messages.
         again: True if a source may give a scan twice, as where two patterns find it.
-        removed: Folder for the removed points, named like the scans; None to write none.
     """
 
-    def __init__(
-        self, folder: Path, option: str = "--out", again: bool = True, removed: Path | None = None
-    ) -> None:
+    def __init__(self, folder: Path, option: str = "--out", again: bool = True) -> None:
         self.folder = folder
-        self.removed = removed
         self.option = option
         self.again = again
 
@@ -41,20 +37,9 @@ class FolderSink:
         """The file that a scan is written to; one that came from no file is written as a PCD."""
         return self.folder / f"{frame.key}{frame.suffix or '.pcd'}"
 
-    def removed_path(self, frame: Frame) -> Path | None:
-        """The file that the removed points of a scan are written to; None if they are dropped."""
-        if self.removed is None:
-            return None
-        return self.removed / self.scan_path(frame).relative_to(self.folder)
-
     def path(self, frame: Frame, suffix: str) -> Path:
         """The file for any other result of a scan, such as its labels."""
         return self.folder / f"{frame.key}{suffix}"
-
-    def files_of(self, frame: Frame) -> list[Path]:
-        """All files that may be written of a frame."""
-        paths = (self.scan_path(frame), self.path(frame, LABEL), self.removed_path(frame))
-        return [path for path in paths if path is not None]
 
     def refuse_clashes(self, source: Iterable[Frame]) -> None:
         """Refuses, before any work, to overwrite a scan or labels of the source, or one result.
@@ -63,12 +48,6 @@ class FolderSink:
             InputError: The results of a frame would overwrite a scan, labels, or the results of
                 another frame.
         """
-        if self.removed is not None and _is_same(self.removed, self.folder):
-            raise InputError(
-                self.removed,
-                f"--removed is the folder of {self.option}, where the cleaned scans go",
-                "Give it another one.",
-            )
         _real_folder.cache_clear()
         written: dict[str, Frame] = {}
         for frame in source:
@@ -84,43 +63,36 @@ class FolderSink:
                     f"Take them in two runs, each to its {self.option}.",
                 )
 
-    def write(
-        self, frame: Frame, scan: Scan | None, label: NDArray[Any], removed: Scan | None = None
-    ) -> None:
-        """Writes the scans, then the labels: if the labels exist, the scans are complete.
+    def write(self, frame: Frame, scan: Scan | None, label: NDArray[Any]) -> None:
+        """Writes the scan, then the labels: if the labels exist, the scan is complete.
 
         Args:
             frame: The frame.
             scan: The cleaned scan; None where only labels are of interest.
             label: Class ids or a bool mask of the scan that the labels are for, (N,).
-            removed: The removed points of the scan; None if they are dropped.
 
         Raises:
             InputError: It cannot be written.
         """
-        removed_path = self.removed_path(frame)
-        if removed is not None and removed_path is not None:
-            write_scan(removed_path, removed)
         if scan is not None:
             write_scan(self.scan_path(frame), scan)
         write_labels(self.path(frame, LABEL), label)
 
-    def _refuse_own_files(self, frame: FileFrame) -> None:
-        remedy = f"Give {self.option} another folder."
+    def refuse_own_scan(self, frame: FileFrame) -> None:
+        """Refuses to write a scan over the one that it is made of."""
         if _is_same(self.scan_path(frame), frame.path):
-            raise InputError(url_of(self.folder), f"would overwrite {frame.name}", remedy)
-        removed = self.removed_path(frame)
-        if removed is not None and _is_same(removed, frame.path):
-            raise InputError(
-                url_of(removed.parent),
-                f"would overwrite {frame.name}",
-                "Give --removed another folder.",
-            )
+            raise self._refused(f"would overwrite {frame.name}")
+
+    def _refuse_own_files(self, frame: FileFrame) -> None:
+        self.refuse_own_scan(frame)
         # Results that lie where labels are looked for would be taken for the truth.
         target = self.path(frame, LABEL)
         places = (frame.label_path, beside(frame.path, LABEL), *label_places(frame.path))
         if any(labels is not None and _is_same(labels, target) for labels in places):
-            raise InputError(url_of(self.folder), f"holds the labels of {frame.name}", remedy)
+            raise self._refused(f"holds the labels of {frame.name}")
+
+    def _refused(self, reason: str) -> InputError:
+        return InputError(url_of(self.folder), reason, f"Give {self.option} another folder.")
 
 
 class LabelSink(FolderSink):
@@ -142,10 +114,8 @@ class LabelSink(FolderSink):
         for frame in frames:
             target = self.path(frame, LABEL)
             if os.path.realpath(target) in there:
-                raise InputError(
-                    self.folder,
-                    f"the results of {frame.name} would overwrite the labels {target}",
-                    f"Give {self.option} another folder.",
+                raise self._refused(
+                    f"the results of {frame.name} would overwrite the labels {target}"
                 )
         super().refuse_clashes(frames)
 

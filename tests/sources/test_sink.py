@@ -10,8 +10,10 @@ from derain.evaluation.hard_cases import scene
 from derain.files import read_scan
 from derain.files.labels import read_labels
 from derain.scan import Scan
+from derain.sources.clean_sink import CleanSink
 from derain.sources.folders import frame_of, frames_of, named_frames, relative_keys
 from derain.sources.frame import MemoryFrame
+from derain.sources.judgement import Judgement
 from derain.sources.sink import FolderSink, LabelSink
 from derain.sources.source import Frames, Source
 
@@ -29,7 +31,7 @@ def names(folder: Path) -> list[str]:
 def test_a_scan_from_memory_is_written_as_a_pcd(tmp_path) -> None:
     (frame,) = Frames.of_scans([Scan.of(scene(30))])
     scan, sink = frame.read(), FolderSink(tmp_path)
-    sink.write(frame, scan, np.zeros(30, bool), scan)  # nobody asks for what is removed
+    sink.write(frame, scan, np.zeros(30, bool))
     assert names(tmp_path) == ["000000.label", "000000.pcd"]
     np.testing.assert_array_equal(read_scan(tmp_path / "000000.pcd").xyz, scene(30)[:, :3])
 
@@ -108,12 +110,10 @@ def test_one_scan_twice_is_refused_where_it_is_not_expected(tmp_path) -> None:
 def test_scans_labels_and_what_is_taken_away_are_named_by_the_key(tmp_path) -> None:
     write(*(tmp_path / f"data/sequences/{sequence}/velodyne/0.bin" for sequence in "ab"))
     source = named_frames([tmp_path / "data"])
-    sink = FolderSink(tmp_path / "out", removed=tmp_path / "removed")
-    sink.refuse_clashes(source)
     rain = np.arange(30) < 4
-    for frame in source:
-        scan = frame.read()
-        sink.write(frame, scan.take(~rain), rain, scan.take(rain))
+    with CleanSink(tmp_path / "out", source, removed=tmp_path / "removed") as sink:
+        for frame in source:
+            sink.write(Judgement(rain.astype(np.float32), rain, rain, frame.read(), frame))
     files = [f"{sequence}/velodyne/0{suffix}" for sequence in "ab" for suffix in (".bin", ".label")]
     assert names(tmp_path / "out") == files
     assert names(tmp_path / "removed") == files[::2]
@@ -127,9 +127,9 @@ def test_what_is_taken_away_is_refused_where_it_would_take_a_place(tmp_path) -> 
     source = named_frames([tmp_path / "scans"])
     out = tmp_path / "out"
     with pytest.raises(InputError, match=r"would overwrite .*1\.bin.* --removed another folder"):
-        FolderSink(out, removed=tmp_path / "scans").refuse_clashes(source)
+        CleanSink(out, source, removed=tmp_path / "scans")
     with pytest.raises(InputError, match="where the cleaned scans go"):
-        FolderSink(out, removed=tmp_path / "scans/../out").refuse_clashes(source)
+        CleanSink(out, source, removed=tmp_path / "scans/../out")
 
 
 @pytest.mark.parametrize("own", ["a/0.label", "labels/0.label", "truth/0.label"])
