@@ -1,22 +1,16 @@
 """Members of one kind by name, such as filters, and what a user's parameters make of them."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import fields
 from importlib import import_module
-from inspect import isabstract
+from inspect import isabstract, signature
 from pkgutil import iter_modules
-from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
+from typing import Any, Generic, TypeVar, cast
 
 from derain.errors import InputError, did_you_mean
 
-if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint
-
-    from _typeshed import DataclassInstance
-
 Kind = TypeVar("Kind")
 Member = TypeVar("Member")
-Made = TypeVar("Made", bound="DataclassInstance")
+Made = TypeVar("Made")
 
 
 class Registry(Mapping[str, Kind], Generic[Kind]):
@@ -125,10 +119,18 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
             try:
                 entry.load()
             except Exception as error:  # whatever the code of others raises
-                _warn_of_broken(entry, error)
+                from derain.system.notices import warn  # here, because it imports tqdm
+
+                package = entry.dist.name if entry.dist else "that brings it"
+                problem = InputError(
+                    f"{entry.group}: {entry.name}",
+                    f"{entry.value} cannot be imported ({type(error).__name__}: {error})",
+                    f"Repair or uninstall the package {package}.",
+                )
+                warn(str(problem))
 
 
-def from_parameters(kind: type[Made], name: str, parameters: Mapping[str, Any]) -> Made:
+def from_parameters(kind: Callable[..., Made], name: str, parameters: Mapping[str, Any]) -> Made:
     """Makes a dataclass from parameters that a user names.
 
     Args:
@@ -139,7 +141,7 @@ def from_parameters(kind: type[Made], name: str, parameters: Mapping[str, Any]) 
     Raises:
         InputError: A parameter that is no field of it, or a value that it refuses.
     """
-    known = [field.name for field in fields(kind)]
+    known = list(signature(kind).parameters)
     if unknown := sorted(set(parameters) - set(known)):
         raise InputError(
             name,
@@ -147,19 +149,6 @@ def from_parameters(kind: type[Made], name: str, parameters: Mapping[str, Any]) 
             f"{did_you_mean(unknown[0], known)}It has {', '.join(known)}.",
         )
     return kind(**parameters)
-
-
-def _warn_of_broken(entry: "EntryPoint", error: Exception) -> None:
-    """Warns that a module of another package cannot be imported."""
-    from derain.system.notices import warn  # here, because it imports tqdm
-
-    package = entry.dist.name if entry.dist else "that brings it"
-    problem = InputError(
-        f"{entry.group}: {entry.name}",
-        f"{entry.value} cannot be imported ({type(error).__name__}: {error})",
-        f"Repair or uninstall the package {package}.",
-    )
-    warn(str(problem))
 
 
 def _origin(member: object) -> str:
