@@ -89,9 +89,11 @@ def recordings_below(
     takes_none = layouts is not None and not layouts
     if takes_none or not os.path.isdir(folder) or _holds_scans(folder) or bags_at(folder):
         return []
-    if (layout := find_layout(folder, layouts)) is not None:
-        sequences = [os.path.realpath(scans.parent) for scans in scan_folders(folder, layout)]
-        _warn_of_other_recordings(folder, sequences, layouts, results)
+    if scans := _laid_out(folder, layouts):
+        whole = Path(os.path.realpath(folder))
+        sequences = [Path(os.path.realpath(each.parent)) for each in scans]
+        if all(sequence.parent == whole for sequence in sequences):
+            _warn_of_others_beside(folder, _Search(folder, layouts, [*results, *sequences]))
         return []
     found = sorted({*_Search(folder, layouts, results).inside(folder)})
     if found:
@@ -99,18 +101,15 @@ def recordings_below(
     return found
 
 
-def _warn_of_other_recordings(
-    folder: Path,
-    sequences: Sequence[str],
-    layouts: Sequence[Layout] | None,
-    results: Sequence[Path],
-) -> None:
+def _laid_out(root: Path, layouts: Sequence[Layout] | None) -> list[Path]:
+    """The folders of scans of a data set or of a part of one; empty if no layout fits."""
+    layout = find_layout(root, layouts)
+    return [] if layout is None else scan_folders(root, layout)
+
+
+def _warn_of_others_beside(folder: Path, search: "_Search") -> None:
     """Warns of recordings beside sequences that lie directly in a folder."""
-    whole = os.path.realpath(folder)
-    if any(os.path.dirname(sequence) != whole for sequence in sequences):
-        return
-    known = [*results, *map(Path, sequences)]
-    if others := [*_Search(folder, layouts, known).inside(folder)]:
+    if others := [*search.inside(folder)]:
         recordings = (
             "1 other recording" if len(others) == 1 else f"{len(others):,} other recordings"
         )
@@ -150,9 +149,7 @@ class _Search:
             return
         if _holds_scans(folder):
             yield folder
-        layout = find_layout(folder, self._layouts)
-        scans = [] if layout is None else scan_folders(folder, layout)
-        sequences = [each.parent for each in scans]
+        sequences = [each.parent for each in _laid_out(folder, self._layouts)]
         yield from sequences
         if all(sequence.parent == folder for sequence in sequences):  # else it is a data set
             yield from bags_at(folder)
@@ -195,10 +192,7 @@ def scans_or_bags(path: Path, layouts: Sequence[Layout] | None) -> tuple[list[Pa
     """
     folders = []
     if os.path.isdir(path):
-        if _holds_scans(path):
-            folders = [path]
-        elif (layout := find_layout(path, layouts)) is not None:
-            folders = scan_folders(path, layout)
+        folders = [path] if _holds_scans(path) else _laid_out(path, layouts)
     if not folders and (bags := [path] if split(path) is not None else bags_at(path)):
         _warn_of_others(path, bags)
         return [], bags

@@ -3,7 +3,7 @@
 from abc import abstractmethod
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Self, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,6 @@ from derain.sources.records import poses_along
 from derain.sources.trajectory import Trajectory
 from derain.stores.mirror import Mirror, mirror
 from derain.stores.objects import StoredObject
-from derain.stores.url import path_of
 
 Value = TypeVar("Value")
 
@@ -142,15 +141,6 @@ class StoredBag(StoredFrame):
         poses = "" if self.trajectory is None else self.trajectory.fingerprint()
         return f"{super().stamp()} {poses}"
 
-    def cloud(self, key: str, name: str, seconds: float | None) -> Self:
-        """One of its clouds, by its key, name and time alone.
-
-        Args:
-            key: Its key.
-            name: Its name in messages.
-            seconds: Its time, seconds; None if unknown.
-        """
-        return replace(self, key=key, path=path_of(name), time=seconds)
 
     def read(self) -> Scan:
         """Refuses: it has several clouds."""

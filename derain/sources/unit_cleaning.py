@@ -16,6 +16,7 @@ from derain.sources.stored_frame import StoredBag
 from derain.sources.unit_judging import UnitJudging
 from derain.sources.units import FrameUnit
 from derain.sources.weather_monitor import SAMPLED_SCANS, recording_numbers
+from derain.stores.url import path_of
 from derain.system.stopwatch import Stopwatch
 from derain.views.scan_issues import HEAVIEST_RAIN, left_out, much_removed, no_points
 
@@ -107,8 +108,8 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
         """The outcome that a record has."""
         first, key, seconds = unit.frames[0], written["key"], written["seconds"]
         cleaned = CleanedScan(**written["cleaned"])
-        if isinstance(first, StoredBag):
-            frame: Frame = first.cloud(key, cleaned.scan, seconds)
+        if isinstance(first, StoredBag):  # its clouds have a key, a name and a time alone
+            frame: Frame = replace(first, key=key, path=path_of(cleaned.scan), time=seconds)
         else:
             frame = unit.by_key[key]
         return ScanOutcome(
