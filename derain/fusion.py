@@ -48,11 +48,9 @@ def nearest_in_time(
     row = np.full(len(times), -1, np.int64)
     if not len(among):
         return row
-    order = np.argsort(among, kind="stable")
-    ascending = among[order]
-    # The first of those at or after each time, and the first of those at the time before it.
-    after = np.searchsorted(ascending, times).clip(max=len(among) - 1)
-    before = np.searchsorted(ascending, ascending[(after - 1).clip(min=0)])
+    ascending, order = np.unique(among, return_index=True)  # of equal times the first row
+    after = np.searchsorted(ascending, times).clip(max=len(ascending) - 1)
+    before = (after - 1).clip(min=0)
     earlier = np.abs(times - ascending[before]) <= np.abs(ascending[after] - times)
     nearest = np.where(earlier, before, after)
     near = np.abs(times - ascending[nearest]) <= within
