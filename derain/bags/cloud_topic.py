@@ -107,7 +107,7 @@ class CloudTopic:
         """
         if self._times is None and self._last is not None and self._last[0] == number:
             return 1e-9 * self._taken(self._last[1])
-        return 1e-9 * float(self._times_of_all()[self._row(number), 1])
+        return 1e-9 * float(self._times_with(number)[number, 1])
 
     def _read(self, number: int) -> Message:
         if self._next is None or not 0 <= number - self._next <= NEAR:
@@ -123,23 +123,26 @@ class CloudTopic:
         """Begins to read shortly before a cloud, or at it, and returns the number of the first."""
         first, start = 0, None
         if number > NEAR:
-            recorded = self._times_of_all()[:, 0]
+            recorded = self._times_with(number)[:, 0]
             if (np.diff(recorded) >= 0).all():
-                start = int(recorded[self._row(number)])
+                start = int(recorded[number])
                 first = int(np.searchsorted(recorded, start))  # several may have one time
         if self._reader is None:
             self._reader = self._open.enter_context(self.bag.opened())
         self._messages = self.bag.messages_of(self._reader, self.topic, start)
         return first
 
-    def _times_of_all(self) -> NDArray[np.int64]:
+    def _times_with(self, number: int) -> NDArray[np.int64]:
         """Time at which the clouds were recorded and taken, nanoseconds, (M, 2).
 
-        The first call reads through the topic.
+        The first call reads through the topic. The index may name more clouds than there are:
+        then one that is not there raises an InputError.
         """
         if self._times is None:
             times = [(each.time, self._taken(each)) for each in self.bag.messages(self.topic)]
             self._times = np.array(times, np.int64).reshape(-1, 2)
+        if number >= len(self._times):
+            raise self.bag.too_few_clouds(self.topic)
         return self._times
 
     def _taken(self, message: Message) -> int:
@@ -148,12 +151,6 @@ class CloudTopic:
             return stamp_of(message.data, self.topic.encoding) or message.time
         except ValueError:  # reading the cloud raises it
             return message.time
-
-    def _row(self, number: int) -> int:
-        """The row of a cloud in the times of all; the index may name more than there are."""
-        if number >= len(self._times_of_all()):
-            raise self.bag.too_few_clouds(self.topic)
-        return number
 
     def _warn_of_other_fields(self, number: int, fields: tuple[PointField, ...]) -> None:
         if self._layouts and fields not in self._layouts:

@@ -141,7 +141,6 @@ class StoredBag(StoredFrame):
         poses = "" if self.trajectory is None else self.trajectory.fingerprint()
         return f"{super().stamp()} {poses}"
 
-
     def read(self) -> Scan:
         """Refuses: it has several clouds."""
         raise InputError(self.name, "is a bag, and no single scan", "Clean it by `derain run`.")
