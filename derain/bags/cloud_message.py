@@ -12,7 +12,7 @@ header).
 """
 
 import struct
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self
 
 from derain.bags.point_cloud import PointCloud, PointField
@@ -74,10 +74,6 @@ class CloudMessage:
         )
         tail = message[read.position :]
         return cls(encoding, head, cloud, tail, stamp)
-
-    def with_cloud(self, cloud: PointCloud) -> Self:
-        """The same message with another cloud."""
-        return replace(self, cloud=cloud)
 
     def to_bytes(self) -> bytes:
         """The bytes of the message."""

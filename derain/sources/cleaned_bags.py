@@ -5,7 +5,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from derain.bags.bag_copy import BagCopy, written_name
@@ -147,9 +147,11 @@ class CleanedBags:
             raise damaged_cloud(frame.name, error) from error
         if self.options.cleaned_topic:
             copy.write(recorded)
-        copy.write(recorded, message.with_cloud(clean).to_bytes(), self.options.cleaned_topic)
+        copy.write(recorded, replace(message, cloud=clean).to_bytes(), self.options.cleaned_topic)
         if self.options.removed_topic:
-            copy.write(recorded, message.with_cloud(removed).to_bytes(), self.options.removed_topic)
+            copy.write(
+                recorded, replace(message, cloud=removed).to_bytes(), self.options.removed_topic
+            )
 
     def _divided(self, cloud: PointCloud, judgement: Judgement) -> tuple[PointCloud, PointCloud]:
         """The cloud without its rain, and its rain alone.

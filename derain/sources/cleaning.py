@@ -138,7 +138,8 @@ def clean(
         work = UnitCleaning(
             method, "", placing, opened.destination, most_removed, sample, finds_recordings
         )
-        if executor is not None or _is_stored(source, opened):
+        is_read_from_store = any(isinstance(frame, StoredFrame) for frame in source)
+        if executor is not None or is_read_from_store or opened.destination.is_stored:
             division = replace(division or Division(), keep_records=True)
         if division is not None and division.keeps_records(source, opened.destination.folder):
             work = replace(work, fingerprint=method.fingerprint())
@@ -184,11 +185,6 @@ def clean(
     scans = sum(max(len(unit.frames), len(found[unit.id])) for unit in units)
     not_cleaned = scans - len(cleaned)
     return CleanReport([*cleaned.values()], [*failures.values()], monitor, before, not_cleaned)
-
-
-def _is_stored(source: Source, sink: CleanSink) -> bool:
-    """True if scans are read from an object store, or written to one."""
-    return sink.destination.is_stored or any(isinstance(each, StoredFrame) for each in source)
 
 
 def _options(

@@ -80,15 +80,15 @@ class FolderSink:
 
     def refuse_own_scan(self, frame: FileFrame) -> None:
         """Refuses to write a scan over the one that it is made of."""
-        if _is_same(self.scan_path(frame), frame.path):
+        if _real(self.scan_path(frame)) == _real(frame.path):
             raise self._refused(f"would overwrite {frame.name}")
 
     def _refuse_own_files(self, frame: FileFrame) -> None:
         self.refuse_own_scan(frame)
         # Results that lie where labels are looked for would be taken for the truth.
-        target = self.path(frame, LABEL)
+        target = _real(self.path(frame, LABEL))
         places = (frame.label_path, beside(frame.path, LABEL), *label_places(frame.path))
-        if any(labels is not None and _is_same(labels, target) for labels in places):
+        if any(labels is not None and _real(labels) == target for labels in places):
             raise self._refused(f"holds the labels of {frame.name}")
 
     def _refused(self, reason: str) -> InputError:
@@ -121,11 +121,6 @@ class LabelSink(FolderSink):
 
     def _refuse_own_files(self, frame: FileFrame) -> None:
         """Checks existing labels alone, because no scan is written."""
-
-
-def _is_same(one: Path, other: Path) -> bool:
-    """True if two paths lead to one file or folder."""
-    return _real(one) == _real(other)
 
 
 def _real(path: Path) -> str:

@@ -1,5 +1,7 @@
 """Messages of clouds, beside those that the library of bags writes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -51,7 +53,7 @@ def test_the_library_reads_what_is_left_of_a_message(encoding) -> None:
     cloud = parsed.cloud.take(keep).with_field("probability", np.float32([0.1, 0.2, 0.3]))
     store = ROS[encoding].store
     read = store.deserialize_ros1 if encoding == ROS1 else store.deserialize_cdr
-    message = read(parsed.with_cloud(cloud).to_bytes(), CLOUD_TYPE)
+    message = read(replace(parsed, cloud=cloud).to_bytes(), CLOUD_TYPE)
 
     assert (message.height, message.width, message.point_step) == (1, 3, 41)
     assert [field.name for field in message.fields][-1] == "probability"
