@@ -21,7 +21,7 @@ from derain.export.runtimes.session import (
     TensorType,
 )
 from derain.scan import Scan
-from derain.sources.frame import Frame, MemoryFrame
+from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
 from derain.sources.recent_frames import FrameInWindow, RecentFrames
@@ -234,8 +234,7 @@ class Derainer(Method):
             judgement = self.judge(scan, stopwatch)
             return replace(judgement, frame=frame) if isinstance(frame, Frame) else judgement
         if not isinstance(frame, Frame):
-            number = self._recent.next_number
-            frame = MemoryFrame(key=f"{number:06d}", number=number, scan=scan)
+            frame = self._recent.frame_of(scan)
         ready = self._recent.push(frame, PlacedScan(scan, frame.time, frame.pose))
         return None if ready is None else self._judged_in_window(ready, stopwatch)
 

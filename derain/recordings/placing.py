@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.recordings.odometry import FrameOdometry
 from derain.scan import Scan
-from derain.sources.frame import Frame, MemoryFrame
+from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
 from derain.sources.recent_frames import FrameInWindow, RecentFrames
@@ -56,8 +56,7 @@ class PlacedFrames(RecentFrames):
             InputError: A frame that cannot be read.
         """
         if not isinstance(frame, Frame):
-            number = self.next_number
-            frame = MemoryFrame(key=f"{number:06d}", number=number, scan=Scan.of(frame))
+            frame = self.frame_of(Scan.of(frame))
         with stopwatch.stage("read"):
             scan = frame.read()  # an object of its own, even of a scan that is pushed again
         with stopwatch.stage("odometry"):

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from derain.errors import InputError
 from derain.files.reading import reading
-from derain.sources.frame import Frame
+from derain.scan import Scan
+from derain.sources.frame import Frame, MemoryFrame
 from derain.views.window import PlacedScan, Window, WindowOfScans
 
 
@@ -79,10 +80,10 @@ class RecentFrames:
         """Number of frames that were taken and not returned yet."""
         return len(self._kept) - self._given
 
-    @property
-    def next_number(self) -> int:
-        """Number of the frame that would follow."""
-        return self._kept[-1][0].number + 1 if self._kept else 0
+    def frame_of(self, scan: Scan) -> Frame:
+        """A frame of a scan alone, as the one that would follow."""
+        number = self._kept[-1][0].number + 1 if self._kept else 0
+        return MemoryFrame(key=f"{number:06d}", number=number, scan=scan)
 
     def starts_new_recording(self, frame: Frame) -> bool:
         """True if a frame does not follow those that were taken."""
