@@ -211,7 +211,7 @@ def teach(
         units = units_of(source, method, block)
         job, shard = division.begin(place, options, units)
         task = Task(job, work)
-        results = (each.result for each in run(task, shard, executor))
+        results = (result for _, result, _ in run(task, shard, executor))
         frames = _known(results, sum(len(unit.frames) for unit in shard), guard, watch)
         if division.shard is not None:
             scans = completed(task, units)

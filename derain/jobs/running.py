@@ -215,19 +215,8 @@ class Task(Generic[UnitT, ResultT]):
         self.job.record(record)
 
 
-@dataclass(frozen=True)
-class UnitResult(Generic[UnitT, ResultT]):
-    """One result.
-
-    Attributes:
-        unit: The unit that it is of.
-        result: The result.
-        before: True if an earlier command had it.
-    """
-
-    unit: UnitT
-    result: ResultT
-    before: bool
+# A unit, one of its results, and whether an earlier command had that.
+UnitResult = tuple[UnitT, ResultT, bool]
 
 
 def run(
@@ -243,7 +232,8 @@ def run(
         executor: Executor of the units; None does one after the other in this process.
 
     Yields:
-        Each result, in the order of the units, as soon as it and all before it are known.
+        A unit, one of its results, and True if an earlier command had that; in the order of the
+        units, as soon as it and all before it are known.
 
     Raises:
         InputError: The executor has ended, or its processes cannot do the work.
@@ -251,7 +241,7 @@ def run(
     if executor is None:
         for unit, done in task.done(units):
             for result in task.do(unit) if done is None else done:
-                yield UnitResult(unit, result, done is not None)
+                yield unit, result, done is not None
     else:
         yield from _run_on_executor(executor, task, units)
 
@@ -300,13 +290,13 @@ def values(
     found: list[Any] = []
     failures: list[InputError] = []
     results = run(task, shard, executor)
-    for each in tqdm(results, total=len(shard), desc=doing, unit=unit, disable=None):
-        if (error := each.result.error) is None:
-            found.append(each.result.content)
+    for done, value, _ in tqdm(results, total=len(shard), desc=doing, unit=unit, disable=None):
+        if (error := value.error) is None:
+            found.append(value.content)
         elif task.job is None:
             raise error
         else:
-            warn(f"{each.unit.id}: {error}")
+            warn(f"{done.id}: {error}")
             failures.append(error)
     if failures:
         raise InputError(
@@ -339,7 +329,7 @@ def _next_results(
 ) -> Iterator[UnitResult[UnitT, ResultT]]:
     unit, done, future = waiting.popleft()
     for result in _await_results(task, unit, future) if done is None else done:
-        yield UnitResult(unit, result, done is not None)
+        yield unit, result, done is not None
 
 
 def _await_results(task: Task[UnitT, ResultT], unit: UnitT, future: Any) -> Sequence[ResultT]:

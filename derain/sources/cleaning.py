@@ -9,7 +9,7 @@ from typing import Any
 from tqdm import tqdm
 
 from derain.errors import InputError
-from derain.jobs.running import Submits, Task, UnitResult, run
+from derain.jobs.running import Submits, Task, run
 from derain.sources.clean_sink import CleanSink
 from derain.sources.cleaned_scan import CleanedScan, ScanOutcome, counts
 from derain.sources.folders import GivenScans, source_of
@@ -155,14 +155,13 @@ def clean(
         else:
             units = [whole(source)]
             cleaning = work.clean(units[0], opened, observer.judged)
-            outcomes = (UnitResult(units[0], outcome, before=False) for outcome in cleaning)
+            outcomes = ((units[0], outcome, False) for outcome in cleaning)
             in_units = False
         scans = sum(len(unit.frames) for unit in units)
         found: dict[str, set[str]] = defaultdict(set)
-        for result in tqdm(outcomes, total=scans, unit="scan", disable=None):
-            outcome = result.result
+        for of_unit, outcome, was_there in tqdm(outcomes, total=scans, unit="scan", disable=None):
             key = outcome.frame.key
-            found[result.unit.id].add(key)
+            found[of_unit.id].add(key)
             observer.noticed(outcome.frame.name, outcome.issues)
             if outcome.error is not None:
                 cleaned.pop(key, None)  # of a bag that failed at a later cloud
@@ -175,11 +174,11 @@ def clean(
             if (measured := outcome.measured) is not None:
                 record = monitor.add(outcome.frame, measured, outcome.recording)
                 outcome = replace(outcome, cleaned=replace(outcome.figures, weather=record))
-            if result.before:
+            if was_there:
                 observer.found(outcome)
             else:
                 observer.cleaned(outcome)
-            before += result.before
+            before += was_there
             cleaned[key] = outcome.figures
     # How many clouds the bags of a store have shows only when they are fetched.
     scans = sum(max(len(unit.frames), len(found[unit.id])) for unit in units)

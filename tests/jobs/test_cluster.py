@@ -21,7 +21,7 @@ def test_a_cluster_does_the_units_of_a_job_and_repeats_one_whose_worker_dies(tmp
         distributed.LocalCluster(n_workers=2, protocol="tcp://", **options) as cluster,
         dask_executor(cluster.scheduler_address) as executor,
     ):
-        found = [each.result for each in run(task, units, executor)]
+        found = [result for _, result, _ in run(task, units, executor)]
     contents = [each.content for each in found]
     assert contents == ["0 done", "1 done", "2 done", None, "4 done"]
     assert found[3].error.reason == "is broken"

@@ -43,7 +43,7 @@ def results(
     out: Path, work: Counting, executor: Executor | None = None, units: list[Unit] = UNITS
 ) -> list[tuple[str, bool]]:
     found = run(Task(begun(out, units), work), units, executor)
-    return [(each.result.content or str(each.result.error), each.before) for each in found]
+    return [(value.content or str(value.error), before) for _, value, before in found]
 
 
 def test_a_second_run_does_nothing_again(out) -> None:
