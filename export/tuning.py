@@ -161,7 +161,7 @@ def tune_filter(
             shared.finish(trial, pooled_iou(filter_from(name, trial.params), labelled))
             after_trial()
         parameters, iou = shared.best()
-    except (optuna.exceptions.OptunaError, SQLAlchemyError) as error:
+    except (optuna.exceptions.OptunaError, SQLAlchemyError, OSError) as error:
         if storage is None:
             raise
         raise storage.refused(error) from error

@@ -84,4 +84,4 @@ def write_labels(path: Path, semantic: NDArray[Any], instance: NDArray[Any] | No
             )
     raw = semantic.astype("<u4") | instance.astype("<u4") << np.uint32(16)
     with replacing(path) as temporary:
-        raw.tofile(temporary)
+        temporary.write_bytes(raw.data)  # not tofile, which hides why it fails

@@ -1,7 +1,7 @@
 """Small made-up data sets in the layouts of the real ones."""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -44,15 +44,6 @@ def wads(tmp_path, write_labelled) -> list[str]:
         *("--data.loading.workers", "0", "--trainer.enable_progress_bar", "false"),
         *("--panels.scans", "0", "--errors.pictures", "0"),
     ]
-
-
-@pytest.fixture
-def full_disk() -> Iterator[Callable[[], None]]:
-    """From its call on, no file may grow beyond 50,000 bytes: a log does not, a result does."""
-    resource = pytest.importorskip("resource", reason="the system has no limits on files")
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    yield lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, before[1]))
-    resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 @pytest.fixture

@@ -141,6 +141,15 @@ def test_a_stored_study_goes_on_with_the_same_scans_and_labels_alone(seen, tmp_p
     assert tune("ror", seen, 1, storage, data="b")[0].iou > 0
 
 
+def test_a_journal_that_can_no_longer_grow_is_named(seen, tmp_path, full_disk) -> None:
+    journal = tmp_path / "study.journal"
+    tune("ror", seen, 1, journal)
+    journal.write_bytes(journal.read_bytes().rstrip().ljust(49_999) + b"\n")
+    full_disk()
+    with pytest.raises(InputError, match=r"study\.journal: .*File too large"):
+        tune("ror", seen, 2, journal)
+
+
 # Two of them are neighbours: nothing lies midway.
 PROBABILITIES = np.array([0, 0.1, np.nextafter(np.float32(0.1), 1), 0.5, 1], np.float32).tolist()
 

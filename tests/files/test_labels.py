@@ -50,3 +50,10 @@ def test_an_id_that_needs_more_than_16_bits_is_not_written(tmp_path, label) -> N
         with pytest.raises(InputError, match="outside 0 to 65535"):
             write_labels(tmp_path / "scan.label", *halves)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_is_the_reason_that_is_named(tmp_path, full_disk) -> None:
+    full_disk()
+    with pytest.raises(InputError, match=r"scan\.label: cannot be written \(File too large\)"):
+        write_labels(tmp_path / "scan.label", np.zeros(20_000, int))
+    assert list(tmp_path.iterdir()) == []
