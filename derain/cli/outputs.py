@@ -10,6 +10,7 @@ from typing import Any, TextIO
 from tqdm import tqdm
 
 from derain.errors import InputError, printable
+from derain.files.atomic import require_writable_folder
 from derain.sources.sink import FolderSink
 from derain.sources.source import Source
 
@@ -22,10 +23,12 @@ def folder_sink(out: Path, source: Source) -> FolderSink:
         source: The source.
 
     Raises:
-        InputError: It holds a scan or labels that would be overwritten, or two scans have one name.
+        InputError: It holds a scan or labels that would be overwritten, two scans have one name, or
+            it cannot be written.
     """
     sink = FolderSink(out, again=False)
     sink.refuse_clashes(source)
+    require_writable_folder(out)
     return sink
 
 

@@ -139,3 +139,11 @@ def test_what_cannot_be_meant_is_refused_before_anything_is_written(
     line = refused("simulate", "--out", tmp_path / "out", *arguments)
     assert line.startswith(f"derain: {message}")
     assert not (tmp_path / "out").exists()
+
+
+def test_an_output_that_cannot_be_written_is_one_line_for_all_scans(
+    refused, clean, tmp_path
+) -> None:
+    (tmp_path / "file").touch()
+    line = refused("simulate", "--on", clean, "--rain", "9", "--out", tmp_path / "file/below")
+    assert "file/below: cannot be written" in line
