@@ -12,6 +12,7 @@ from onnxruntime.quantization import (
     CalibrationMethod,
     QuantFormat,
     QuantType,
+    quant_pre_process,
     quantize_static,
 )
 
@@ -67,7 +68,8 @@ def quantised(
     with tempfile.TemporaryDirectory() as folder:
         # By way of files: quantize_static moves the tensors out of a model that it is given.
         given, path = Path(folder) / "float32.onnx", Path(folder) / "int8.onnx"
-        onnx.save(proto, given)
+        # It is optimised already; what it gains are the shapes, and onnxruntime's leave to go on.
+        quant_pre_process(proto, given, skip_optimization=True, skip_symbolic_shape=True)
         quantize_static(
             given,
             path,

@@ -21,7 +21,7 @@ from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export import onnx_file
 from derain.export.onnx_file import export
 from derain.export.proof import FINITE, INT8, THREADS, Proof
-from derain.export.quantisation import CalibrationReader
+from derain.export.quantisation import CalibrationReader, quantised
 from derain.export.runtime import Derainer
 from derain.scan import Scan
 from derain.sources.frame import Frame, MemoryFrame
@@ -101,6 +101,14 @@ def test_in_eight_bits_nothing_leaves_the_integers_between_image_and_scores(
     assert run["QLinearConv"] == convolutions
     assert run["QuantizeLinear"] == run["DequantizeLinear"] == 1
     assert not run.keys() & {"Conv", "FusedConv", "Relu", "Add", "Concat"}
+
+
+def test_onnxruntime_has_nothing_to_say_about_a_graph_that_is_ready(
+    image_model, image_onnx, caplog
+) -> None:
+    view = image_model.spec.make_view()
+    quantised(onnx.load(image_onnx), view, CALIBRATION[:1], image_model.INTEGER_OPERATORS)
+    assert not caplog.records
 
 
 def test_the_proof_is_made_on_the_calibration_scans_and_on_every_hard_case(int8) -> None:
