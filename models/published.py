@@ -84,8 +84,10 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
     with reading(path), path.open("rb") as file:
         try:
             _refuse_compressed(file)
-            with safe_globals(
-                [dict, defaultdict, *((Placeholder, name) for name in TRAINER_STATE)]
+            placeholders = [(Placeholder, name) for name in TRAINER_STATE]
+            with (
+                safe_globals([dict, defaultdict, *placeholders]),
+                warnings.catch_warnings(action="ignore"),  # of what is refused, too
             ):
                 content = torch.load(file, map_location="cpu", weights_only=True)
         except Exception as error:  # torch.load raises what its parts raise, zip's own included

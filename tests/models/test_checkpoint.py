@@ -177,6 +177,13 @@ def test_a_file_that_is_cut_short_or_of_something_else_is_refused(path) -> None:
             load_model(path)
 
 
+def test_a_bare_pickle_is_refused_without_a_word_from_torch(path, recwarn) -> None:
+    path.write_bytes(pickle.dumps({"a": 1}))
+    with pytest.raises(InputError, match=rf"model\.ckpt: {DAMAGED}"):
+        load_model(path)
+    assert not recwarn.list
+
+
 @pytest.mark.parametrize("writer", ["torch", "pickle"])
 @pytest.mark.parametrize("read", [load_model, read_state_dict])
 def test_code_in_a_file_does_not_run(content, tmp_path, path, writer, read) -> None:
