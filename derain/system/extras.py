@@ -56,6 +56,8 @@ class Extra:
         try:
             return import_module(name)
         except (ImportError, OSError) as error:
+            if isinstance(error.__cause__, KeyboardInterrupt):  # turned into one by C++
+                raise error.__cause__ from None
             if isinstance(error, ModuleNotFoundError) and error.name in (self.library, name):
                 raise _missing(subject, [self]) from error
             raise InputError(

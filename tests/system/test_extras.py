@@ -95,6 +95,14 @@ def test_a_library_that_is_there_and_broken_is_not_called_missing(tmp_path, monk
     assert not isinstance(refusal.value, MissingExtraError)
 
 
+def test_ctrl_c_in_an_import_is_not_called_a_broken_library(tmp_path, monkeypatch) -> None:
+    code = "raise ImportError('initialization failed') from KeyboardInterrupt()"
+    (tmp_path / "derain_interrupted.py").write_text(code)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(KeyboardInterrupt):
+        Extra("las", "derain_interrupted").load("a.las")
+
+
 def test_an_import_that_failed_names_the_extra_that_would_mend_it(request) -> None:
     of_a_part = ModuleNotFoundError("no", name="matplotlib.nothing")
     assert missing_extra("view", of_a_part) is None  # the library itself is installed
