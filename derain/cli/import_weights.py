@@ -66,8 +66,8 @@ def main(arguments: argparse.Namespace) -> int:
     try:
         model = published[name].from_published(weights, data.normalised_as(stats), arguments.grid)
     except InputError as error:
-        if str(error.subject).startswith("--"):
-            raise
+        if str(error.subject).startswith("--") or error.subject in ("grid", data.name):
+            raise  # of an option, the grid or the card: not of the file
         raise InputError(arguments.weights, error.reason, error.remedy) from error
     model.adopt(replace(model.spec, training=record_of_sequences(data.split.get("train", ()))))
     save_model(model, arguments.out)

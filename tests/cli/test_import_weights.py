@@ -80,16 +80,23 @@ def test_a_checkpoint_as_salsanext_saves_it_comes_with_its_grid(succeed, random_
         ("cues", "published.pt", ("wads",), "cues: no weights of it were published. Available: l"),
         ("outdet", "none.pt", ("wads",), "none.pt: there is no such file"),
         ("outdet", "published.pt", ("mars",), "mars: no such data card. Give a YAML file or one"),
-        ("outdet", "published.pt", ("rehearse3d",), "the data card has no statistics"),
+        ("outdet", "published.pt", ("rehearse3d",), "REHEARSE-3D: the data card has no"),
         ("outdet", "published.pt", ("semantickitti",), "--data: SemanticKITTI has no rain"),
         ("outdet", "published.pt", ("wads", "--grid", "wads"), "--grid: outdet sees neighbours"),
         ("outdet", "other.pt", ("wads",), "other.pt: the state_dict is of another network (1"),
         ("salsanext", "published.pt", ("wads",), "the state_dict is of another network"),
+        (
+            "salsanext",
+            "salsanext.pt",
+            ("wads", "--grid", "no"),
+            "grid: there is no grid named 'no'",
+        ),
     ],
 )
 def test_what_cannot_be_imported_is_one_line_and_exit_code_2(
-    refused, published, network, weights, options, reason
+    refused, published, random_salsanext, network, weights, options, reason
 ) -> None:
+    torch.save(training_checkpoint(random_salsanext), "salsanext.pt")
     torch.save({key: tensor for key, tensor in published.items() if key != "fc.bias"}, "other.pt")
     line = refused("import-weights", network, weights, "--out", "out.ckpt", "--stats", *options)
     assert reason in line
