@@ -52,14 +52,15 @@ class SimulatedDataModule(SequenceDataModule):
         self.workers = workers or usable_cores()
 
     def prepare_data(self) -> None:
-        """Simulates the data set where it is missing.
+        """Simulates the data set where it is missing, and finds its scans.
 
         Raises:
-            InputError: A folder that holds something else or cannot be written.
+            InputError: A folder that holds something else or cannot be written, or missing scans.
         """
         if self.make:
             with processes(self.workers) as executor:
                 simulate_track(self.root, self.campaign, executor, keep=False)
+        super().prepare_data()
 
 
 class Simulated(SimulatedDataModule):
