@@ -76,6 +76,8 @@ def test_what_is_not_measured_does_not_change_the_full_scale() -> None:
     without = Scan.of(scene()[:, :3])
     assert SelectionRule.fitted({}, [without]).full_scale == 255.0
     assert SelectionRule.fitted({}, [without, bright(0.5)]).full_scale == 1.0
+    assert SelectionRule.fitted({}, [bright(np.nan)]).full_scale == 255.0
+    assert SelectionRule.fitted({}, [bright(np.nan), bright(0.5)]).full_scale == 1.0
 
 
 @pytest.mark.parametrize(
