@@ -69,7 +69,7 @@ def scan_of(
         InputError: No coordinates, coordinates that are not numbers, or several columns that match
             one name: see :func:`derain.scan.named`.
     """
-    flat = _numbers(fields, 1)
+    flat = _numbers(fields, 1, kinds="biuf")
     intensity = intensity_name(path, flat)
     radar = named(flat, "radar", path)
     return Scan(
@@ -98,12 +98,18 @@ def intensity_name(subject: str | Path, names: Iterable[str]) -> str | None:
     return next((name for name in found if name is not None), None)
 
 
-def _numbers(fields: Mapping[str, NDArray[Any]], *axes: int) -> dict[str, NDArray[Any]]:
-    """The columns that hold numbers and have one of these numbers of axes."""
+def _numbers(
+    fields: Mapping[str, NDArray[Any]], *axes: int, kinds: str = "iuf"
+) -> dict[str, NDArray[Any]]:
+    """The columns that hold numbers and have one of these numbers of axes; (N, 1) becomes (N,)."""
+    columns = {
+        name: column[:, 0] if column.shape[1:] == (1,) else column
+        for name, column in fields.items()
+    }
     return {
         name: column
-        for name, column in fields.items()
-        if column.dtype.kind in "iuf" and column.ndim in axes
+        for name, column in columns.items()
+        if column.dtype.kind in kinds and column.ndim in axes
     }
 
 

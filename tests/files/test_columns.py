@@ -88,6 +88,22 @@ def test_coordinates_that_are_no_numbers_are_named_with_what_they_are(
     assert "has no x, y and z" not in refused.value.reason
 
 
+def test_truth_values_tell_which_points_are_of_the_radar(tmp_path) -> None:
+    radar = np.array([True, False, True])
+    np.savez(tmp_path / "scan.npz", xyz=np.ones((3, 3)), radar=radar)
+    np.testing.assert_array_equal(read_scan(tmp_path / "scan.npz").radar, radar)
+
+
+def test_a_field_of_one_value_in_brackets_is_a_column(tmp_path) -> None:
+    points = np.ones(3, [(name, "f4", (1,)) for name in ("x", "y", "z", "intensity")])
+    points["intensity"] = [[1], [2], [3]]
+    np.save(tmp_path / "scan.npy", points)
+    scan = read_scan(tmp_path / "scan.npy")
+    assert scan.intensity.tolist() == [1, 2, 3]
+    write_scan(tmp_path / "copy.npy", scan)
+    assert (tmp_path / "copy.npy").read_bytes() == (tmp_path / "scan.npy").read_bytes()
+
+
 def written(path: Path, names: tuple[str, ...]) -> Path:
     """A file of ten points, whose first holds the place of each column, from 1."""
     rows = np.arange(1, len(names) + 1, dtype=np.float32) + np.arange(10, dtype=np.float32)[:, None]
