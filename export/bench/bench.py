@@ -93,7 +93,7 @@ class Bench:
 
 
 def bench(
-    methods: Sequence[GivenMethod] | Mapping[str, GivenMethod],
+    methods: str | Path | Sequence[GivenMethod] | Mapping[str, GivenMethod],
     scans: GivenScans,
     card: DataCard | str | Path,
     *,

@@ -103,16 +103,16 @@ class BenchEntry:
 
 
 def bench_entries(
-    methods: Sequence[GivenMethod] | Mapping[str, GivenMethod],
+    methods: str | Path | Sequence[GivenMethod] | Mapping[str, GivenMethod],
     learn_from: LearnFrom | None = None,
     runtime: Runtime = Runtime(),
 ) -> list[BenchEntry]:
     """The methods of a bench.
 
     Args:
-        methods: The methods, by their titles or with titles of their own. A text is ``default``, an
-            exported model, a YAML file of parameters, a filter or a baseline (position, intensity,
-            all, none), and without a mapping may have ``title=`` before it.
+        methods: The methods, by their titles or with titles of their own; or one text. A text is
+            ``default``, an exported model, a YAML file of parameters, a filter or a baseline
+            (position, intensity, all, none), and without a mapping may have ``title=`` before it.
         learn_from: Scans for position and intensity; None where there are none to learn from.
         runtime: A second runtime for every model, besides onnxruntime.
 
@@ -120,6 +120,8 @@ def bench_entries(
         InputError: No method; one that is not known or cannot be read, or has nothing to learn
             from; two of one title; or a runtime that cannot run the models, or has none to run.
     """
+    if isinstance(methods, str | Path):
+        methods = [methods]
     if not methods:
         raise InputError("methods", "there are none", "Give one or more.")
     if isinstance(methods, Mapping):

@@ -44,6 +44,7 @@ def test_a_row_is_called_by_its_title_else_by_its_name(tmp_path) -> None:
         f"other={odd}": ("other", "dsor"),
     }
     rows = bench_entries([*names])
+    assert [row.title for row in bench_entries("dror")] == ["dror"]
     assert [(row.title, row.kind) for row in rows] == [*names.values()]
     assert rows[4].filter == DSOR(range_multiplier=0.1)
     assert rows[0].facts["weights"] == number_of_weights(KEPT.read_bytes())
