@@ -54,9 +54,10 @@ class CleanReport:
         )
         odd = sum(bool(scan.warnings) for scan in self.scans)
         before = f" ({self.before:,} of them done before)" if self.before else ""
+        failed = f", {self.not_cleaned:,} not cleaned" if self.not_cleaned else ""
         return (
-            f"{len(self.scans):,} scans{before}: {counts(points, valid, rain)}, {self.weather}; "
-            f"{odd:,} scans with warnings"
+            f"{len(self.scans):,} scans{before}{failed}: {counts(points, valid, rain)}, "
+            f"{self.weather}; {odd:,} scans with warnings"
         )
 
 

@@ -39,6 +39,7 @@ def test_a_scan_that_cannot_be_read_is_reported_and_the_others_are_cleaned(tmp_p
         *[("judged", "2.bin"), ("cleaned", "2.bin")],
     ]
     assert [Path(str(error.subject)).name for error in report.failures] == ["1.bin"]
+    assert str(report).startswith("2 scans, 1 not cleaned: 400 points")
     assert {path.name for path in out.iterdir()} == {"0.bin", "0.label", "2.bin", "2.label"}
     for scan in report.scans:
         path = Path(scan.scan)
