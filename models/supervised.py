@@ -21,6 +21,9 @@ from derain.views.view import IGNORED
 # Share of the training in which the learning rate rises; then it falls.
 WARM_UP_SHARE = 0.1
 
+# The learning rate rises in this many steps at least: torch would divide a single one by 0.
+SHORTEST_WARM_UP = 1.5
+
 # The first learning rate is the highest divided by this, and the last at least this share of it.
 FIRST_DIVISOR, LEAST_SHARE = 25.0, 4e-6
 
@@ -120,11 +123,12 @@ def one_cycle(model: SupervisedModule, final_share: float = 0.0) -> OptimizerLRS
     optimizer = torch.optim.AdamW(
         model.parameters(), lr=rate, weight_decay=model.hparams["weight_decay"]
     )
+    steps = max(int(model.trainer.estimated_stepping_batches), 2)
     schedule = torch.optim.lr_scheduler.OneCycleLR(
         optimizer,
         rate,
-        total_steps=max(int(model.trainer.estimated_stepping_batches), 2),
-        pct_start=WARM_UP_SHARE,
+        total_steps=steps,
+        pct_start=max(WARM_UP_SHARE, SHORTEST_WARM_UP / steps),
         div_factor=FIRST_DIVISOR,
         final_div_factor=1 / (FIRST_DIVISOR * max(final_share, LEAST_SHARE)),
     )

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import lightning
 import numpy as np
@@ -21,6 +22,7 @@ from derain.export.runtime import Derainer
 from derain.learning.batch import Batch, Sample
 from derain.models.relative_outdet import RelativeOutDet, RelativeOutDetNetwork
 from derain.models.relative_outdet.network import in_steps
+from derain.models.supervised import FIRST_DIVISOR, one_cycle
 from derain.scan import Scan
 from derain.views.candidates import Bound, Candidates
 from derain.views.neighbour_search import NeighbourSearch
@@ -164,6 +166,21 @@ def test_it_takes_no_candidates(trained) -> None:
 def test_too_small_a_neighbourhood_is_refused() -> None:
     with pytest.raises(InputError, match="neighbours"):
         RelativeOutDet(neighbours=3)
+
+
+@pytest.mark.parametrize("steps", [1, 2, 9, 10, 11, 40])
+def test_a_learning_rate_of_one_cycle_begins_low_however_short_the_training(steps) -> None:
+    model = RelativeOutDet()
+    model.trainer = SimpleNamespace(estimated_stepping_batches=steps)
+    schedule = one_cycle(model)["lr_scheduler"]["scheduler"]
+    rates = [schedule.get_last_lr()[0]]
+    for _ in range(steps - 1):
+        schedule.optimizer.step()
+        schedule.step()
+        rates += schedule.get_last_lr()
+    highest = model.hparams["learning_rate"]
+    assert rates[0] == pytest.approx(highest / FIRST_DIVISOR)
+    assert max(rates) <= highest
 
 
 def test_a_training_of_one_cycle_goes_on_with_steps_of_as_many_scans_alone(
