@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from derain.annotation.manifest import FEWEST_SCANS
+from derain.cards.card import load_card
 from derain.datamodules.taught import Taught
 from derain.errors import InputError
 from derain.export.methods import load_method, named_method, over_recording
@@ -68,6 +69,8 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
             f"{scans}: too few for training and validation",
             f"Record {FEWEST_SCANS} or more, one after the other; twenty are enough.",
         )
+    if config.card is not None:
+        load_card(config.card)  # which is used after the training
     student = student_of(config, source)
     require_writable(config.out)
     _clear(config.work)

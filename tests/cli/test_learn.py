@@ -119,6 +119,7 @@ def test_a_folder_of_something_else_is_not_cleared(refused, recording) -> None:
     [
         (2, (), "2 scans: too few for training and validation"),
         (3, ("--teacher", "nobody"), "derain: nobody: no such method or file"),
+        (3, ("--card", "nobody's"), "nobody's: no such data card"),
         (3, ("--poses", "none.txt", "--teacher", "dror"), "none.txt"),
     ],
 )
