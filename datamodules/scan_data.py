@@ -170,7 +170,10 @@ def split_source(
     sequences = split.get("test" if part == "predict" else part, ())
     if not sequences:
         raise InputError(
-            root, f"no sequences are named for {part}", "Give a split, or simulate more sequences."
+            root,
+            f"no sequences are named for {part}",
+            "Simulate more of them; or give `derain fit` a --data.split, and other commands "
+            "another --part.",
         )
     folders = [root / layout.sequences / name for name in sequences]
     for folder in folders:

@@ -74,7 +74,7 @@ def test_folders_can_have_other_names(tmp_path, write) -> None:
 @pytest.mark.parametrize(
     ("split", "part", "message"),
     [
-        ({"train": ["003"]}, "validation", "no sequences are named for validation"),
+        ({"train": ["003"]}, "validation", "are named for validation.* --part"),
         ({"train": ["003"]}, "predict", "no sequences are named for predict"),
         ({"train": ["003", "099"]}, "train", "099/lidar_radar_pcd: no such folder, though"),
         ({"train": ["empty"]}, "train", "empty/lidar_radar_pcd: holds no scans"),
