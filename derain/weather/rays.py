@@ -35,14 +35,8 @@ TINY = np.finfo(np.float32).tiny
 # and the higher the nearer it is.
 SCORES_IN_SECTOR = 2048
 
-# Multipliers of the hash: an odd number whose product mixes every bit into the upper ones, and what
-# makes another one of it for the next round.
-# Sources: Knuth, "The Art of Computer Programming", volume 3, 6.4 (2³² over the golden ratio);
-# Steele and Vigna 2021, "Computationally easy, spectrally good multipliers".
-MULTIPLIER, NEXT_MULTIPLIER = 2654435769, 0x915F77F5
-
-# A sample takes one value in ONE_IN, and represents all of them if it has FEWEST_SAMPLED or more.
-ONE_IN, FEWEST_SAMPLED = 16, 3000
+# Bits that such a number takes.
+BITS_OF_END = (RAY_SECTORS * SCORES_IN_SECTOR).bit_length()
 
 
 def ray_ends(scan: Scan, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -71,11 +65,9 @@ def ray_ends(scan: Scan, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
     ends = _scores(reach, rain)
     # The returns of a ray share its sector, so that the highest number is that of the best score.
     ends += SECTOR_OF_CELL.take(azimuth)
-    if seem_distinct(cell):  # as of sensors of one return, which saves a third of the time
-        return _counted(ends)
-    further, ray = repetitions(cell)
-    np.maximum.at(ends, ray, ends.take(further))
-    return _counted(ends) - _counted(ends.take(further))
+    returns = np.sort(cell.astype(np.int64) << BITS_OF_END | ends)
+    last_of_ray = np.diff(returns >> BITS_OF_END, append=-1) != 0
+    return _counted(returns[last_of_ray] & ((1 << BITS_OF_END) - 1))
 
 
 def _azimuth_cells(x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray[np.uint32]:
@@ -84,25 +76,18 @@ def _azimuth_cells(x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray[np
     They are alike not in degrees but in y / (|x| + |y|), which takes no trigonometry: it goes
     around the circle straight from corner to corner of a square in it.
     """
-    around = np.abs(x)
-    around += np.abs(y)
-    around += TINY  # straight up, any azimuth will do
-    quarters = np.divide(y, around, out=around)  # -1 right, 0 ahead, 1 left
-    np.subtract(2, quarters, out=quarters, where=x < 0)  # 2 behind, up to 3 right again
-    quarters += 1
-    quarters *= CELLS_IN_QUARTER
-    cells = quarters.astype(np.uint32)
+    # Straight up, any azimuth will do.
+    quarters = y / (np.abs(x) + np.abs(y) + TINY)  # -1 right, 0 ahead, 1 left
+    quarters = np.where(x < 0, 2 - quarters, quarters)  # 2 behind, up to 3 right again
+    cells = ((quarters + 1) * CELLS_IN_QUARTER).astype(np.uint32)
     cells[cells == CELLS_AROUND] = 0
     return cells
 
 
 def _inclination_cells(z: NDArray[np.float32], reach: NDArray[np.float32]) -> NDArray[np.uint32]:
     """Numbers of the cells of inclination, alike in z / range, uint32 (M,)."""
-    upwards = z / (reach + TINY)
-    np.clip(upwards, -1, 1, out=upwards)  # nearer than 10⁻¹⁹ m the range becomes 0
-    upwards += 1
-    upwards *= CELLS_UPWARDS
-    return upwards.astype(np.uint32)
+    upwards = np.clip(z / (reach + TINY), -1, 1)  # nearer than 10⁻¹⁹ m the range becomes 0
+    return ((upwards + 1) * CELLS_UPWARDS).astype(np.uint32)
 
 
 def _sectors_of_cells() -> NDArray[np.int32]:
@@ -121,71 +106,14 @@ SECTOR_OF_CELL = _sectors_of_cells()
 
 def _scores(reach: NDArray[np.float32], rain: NDArray[np.bool_]) -> NDArray[np.int32]:
     """Priority of returns among those of their ray, int32 (M,): rain first, the nearest of it."""
-    place = reach * np.float32(1 / BIN)
-    np.minimum(place, RANGE_BINS - 1, out=place)  # not above the last bin, however far
+    place = np.minimum(reach / BIN, RANGE_BINS - 1)  # not above the last bin, however far
     scores = place.astype(np.int32)
-    drops = np.flatnonzero(rain)
-    scores[drops] = SCORES_IN_SECTOR - 1 - scores[drops]
-    return scores
+    return np.where(rain, SCORES_IN_SECTOR - 1 - scores, scores)
 
 
-def _counted(ends: NDArray[np.int32]) -> NDArray[np.int64]:
+def _counted(ends: NDArray[np.int64]) -> NDArray[np.int64]:
     """Numbers of rays by what they end at, sector and bin, int64 (2, RAY_SECTORS, RANGE_BINS)."""
     counts = np.bincount(ends, minlength=RAY_SECTORS * SCORES_IN_SECTOR)
     counts = counts.reshape(RAY_SECTORS, SCORES_IN_SECTOR)
     rain = counts[:, ::-1]
     return np.stack([counts[:, :RANGE_BINS], rain[:, :RANGE_BINS]]).astype(np.int64)
-
-
-def repetitions(numbers: NDArray[np.uint32]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Finds the numbers that repeat another one.
-
-    The hash of each number names a slot of a table, into which the place of the number is written,
-    over that of any earlier number. A number whose slot holds another place repeats the number at
-    that place, or only shares the slot with it. Numbers that only share a slot, and all that equal
-    them, go into another round with another hash. They are few, while a sort, which takes five
-    times as long, moves all numbers.
-
-    Args:
-        numbers: uint32 (N,).
-
-    Returns:
-        Places of which the numbers are those at other places, (R,), in no order; and these, (R,).
-        None of these is in the first, so that leaving the first out leaves each number once.
-    """
-    table = np.empty(1 << max(2 * len(numbers), 2).bit_length(), np.int32)
-    lower = np.uint32(33 - len(table).bit_length())  # the bits of a hash that number no slot
-    multiplier, pending = MULTIPLIER, numbers
-    places = np.arange(len(numbers), dtype=np.int32)
-    repeating, repeated = [places[:0]], [places[:0]]
-    while len(pending):
-        slot = (pending * np.uint32(multiplier) >> lower).astype(np.intp)
-        table[slot] = places  # only slots that were written to are read, so that it needs no zeros
-        found = table.take(slot)
-        equal = numbers.take(found) == pending
-        # take is several times faster than indexing by truth values that follow no pattern.
-        repeats, sharing = np.flatnonzero(equal & (found != places)), np.flatnonzero(~equal)
-        repeating.append(places.take(repeats))
-        repeated.append(found.take(repeats))
-        places, pending = places.take(sharing), pending.take(sharing)
-        multiplier = multiplier * NEXT_MULTIPLIER % 2**32
-    return np.concatenate(repeating, dtype=np.intp), np.concatenate(repeated, dtype=np.intp)
-
-
-def seem_distinct(numbers: NDArray[np.uint32]) -> bool:
-    """True if a sample shows that next to none of the numbers repeats another.
-
-    The sample is of values, not of places, so that it has all that equal one of it. Of few numbers
-    the answer is no.
-
-    Args:
-        numbers: uint32 (N,).
-
-    Returns:
-        Whether the sample has no repetition, and is so large that, with one chance in twenty of an
-        error, no more than three in FEWEST_SAMPLED of the values are repeated.
-
-    Source: Hanley and Lippman-Hand 1983, the rule of three.
-    """
-    sampled = np.flatnonzero(numbers * np.uint32(NEXT_MULTIPLIER) < 2**32 // ONE_IN)
-    return len(sampled) >= FEWEST_SAMPLED and not len(repetitions(numbers.take(sampled))[0])

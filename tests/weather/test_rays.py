@@ -11,17 +11,7 @@ from derain.files import read_scan
 from derain.files.labels import read_labels
 from derain.scan import Scan
 from derain.views.returns import pair_returns
-from derain.weather.rays import (
-    BIN,
-    FEWEST_SAMPLED,
-    MULTIPLIER,
-    ONE_IN,
-    RANGE_BINS,
-    RAY_SECTORS,
-    ray_ends,
-    repetitions,
-    seem_distinct,
-)
+from derain.weather.rays import BIN, RANGE_BINS, RAY_SECTORS, ray_ends
 
 # A return: number of its ray, range in metres, and whether it is rain.
 Return = tuple[int, float, bool]
@@ -114,32 +104,3 @@ def test_of_real_scans_as_many_rays_are_found_as_by_their_pairs_of_returns(share
         other, met = ray_ends(scan, rain).sum(axis=(1, 2))
         assert other + met == pytest.approx(of_pairs.rays, rel=0.001)
         assert met == pytest.approx(of_pairs.met_rain, rel=0.001)
-
-
-@given(st.lists(st.integers(0, 2**32 - 1) | st.integers(0, 20), max_size=200))
-def test_each_number_is_left_once_and_the_others_repeat_it(values) -> None:
-    numbers = np.array(values, np.uint32)
-    repeating, repeated = repetitions(numbers)
-    np.testing.assert_array_equal(numbers[repeating], numbers[repeated])
-    left = np.delete(numbers, repeating)
-    assert sorted(left) == sorted(set(values))
-    assert not set(repeating) & set(repeated)
-
-
-def test_numbers_of_one_slot_are_kept_apart() -> None:
-    # What the multiplier makes 0, 1, 2 and so on of, so that all upper bits are 0.
-    inverse = pow(MULTIPLIER, -1, 2**32)
-    numbers = np.array([place * inverse % 2**32 for place in range(2000)] * 2, np.uint32)
-    repeating, repeated = repetitions(numbers)
-    assert len(repeating) == 2000
-    np.testing.assert_array_equal(np.abs(repeating - repeated), 2000)
-
-
-def test_a_sample_shows_whether_many_numbers_repeat_others() -> None:
-    generator = np.random.default_rng(0)
-    many = np.unique(generator.integers(0, 2**32, 2 * ONE_IN * FEWEST_SAMPLED, np.uint32))
-    generator.shuffle(many)
-    assert seem_distinct(many)
-    again = generator.choice(many, len(many) // 100)
-    assert not seem_distinct(np.concatenate([many, again]))
-    assert not seem_distinct(many[: FEWEST_SAMPLED * ONE_IN // 2])  # too few to know
