@@ -107,7 +107,7 @@ SECTOR_OF_CELL = _sectors_of_cells()
 def _scores(reach: NDArray[np.float32], rain: NDArray[np.bool_]) -> NDArray[np.int32]:
     """Priority of returns among those of their ray, int32 (M,): rain first, the nearest of it."""
     place = np.minimum(reach / BIN, RANGE_BINS - 1)  # not above the last bin, however far
-    scores = place.astype(np.int32)
+    scores: NDArray[np.int32] = place.astype(np.int32)
     return np.where(rain, SCORES_IN_SECTOR - 1 - scores, scores)
 
 
