@@ -98,23 +98,9 @@ class FilterDerainer(Method):
         """No: a filter returns which points are rain, and no more."""
         return False
 
-    @property
-    def window(self) -> Window:
-        """No scans but the one that it judges."""
-        return Window()
-
     def depends_on(self, recording: Sequence[Frame]) -> Window:
         """No scans but the one that it judges."""
         return self.window
-
-    @property
-    def waiting(self) -> int:
-        """Number of frames that were pushed and not answered: none, a filter sees one at a time."""
-        return 0
-
-    def starts_new_recording(self, frame: Frame) -> bool:
-        """True if pushing a frame would drop those that wait: always False."""
-        return False
 
     def push(
         self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch | None = None
@@ -134,10 +120,6 @@ class FilterDerainer(Method):
         with stopwatch.stage("read"):
             scan = frame.read()
         return replace(self.judge(scan, stopwatch), frame=frame)
-
-    def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
-        """Answers for the frames that wait for others after them: none do."""
-        return iter(())
 
     def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
         """Warnings about a scan for the filter, or for any method that uses places."""

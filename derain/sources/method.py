@@ -51,9 +51,9 @@ class Method(ABC):
     _scans_checked: int = 0
 
     @property
-    @abstractmethod
     def window(self) -> Window:
-        """Number of scans that it needs before and after the one that it judges."""
+        """Scans that it needs before and after the one that it judges; none by default."""
+        return Window()
 
     @property
     def gives_probabilities(self) -> bool:
@@ -61,13 +61,13 @@ class Method(ABC):
         return True
 
     @property
-    @abstractmethod
     def waiting(self) -> int:
-        """Number of frames that were pushed and not answered."""
+        """Number of frames that were pushed and not answered: none, if it sees one at a time."""
+        return 0
 
-    @abstractmethod
     def starts_new_recording(self, frame: Frame) -> bool:
         """True if pushing a frame would drop those that wait, because it does not follow them."""
+        return False
 
     @abstractmethod
     def push(
@@ -91,7 +91,6 @@ class Method(ABC):
             InputError: A frame that cannot be read or judged.
         """
 
-    @abstractmethod
     def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
         """Ends a recording: answers for the frames that still wait, with the scans that there are.
 
@@ -104,6 +103,7 @@ class Method(ABC):
         Raises:
             InputError: A frame that cannot be judged.
         """
+        return iter(())
 
     @abstractmethod
     def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
