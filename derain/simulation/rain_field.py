@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from numpy.random import Generator
@@ -56,22 +55,6 @@ SEARCH_STEP = 0.5
 BETWEEN_STEPS = 1.01
 
 
-class RainField(Protocol):
-    """A rain rate over the ground."""
-
-    @property
-    def heaviest(self) -> float:
-        """A rate in mm/h that is exceeded nowhere."""
-
-    def rate(self, x: Floats, y: Floats) -> Floats:
-        """Rain rate in mm/h at ground positions.
-
-        Args:
-            x: Forward, metres in the sensor frame, any shape.
-            y: To the left, metres in the sensor frame, the same shape.
-        """
-
-
 @dataclass(frozen=True)
 class UniformRain:
     """Rain that is the same everywhere.
@@ -91,11 +74,11 @@ class UniformRain:
 
     @property
     def heaviest(self) -> float:
-        """The rain rate, in mm/h."""
+        """A rate in mm/h that is exceeded nowhere: the only one."""
         return self.nominal
 
     def rate(self, x: Floats, y: Floats) -> Floats:
-        """The rain rate in mm/h, for each position."""
+        """Rain rate in mm/h at ground positions, as of :meth:`SprinkledRain.rate`."""
         return np.full(np.shape(x), float(self.nominal))
 
 
@@ -162,6 +145,10 @@ class SprinkledRain:
         across = -GUST_ACROSS * np.cos(phase / 2)
         rows = [np.stack([along, across + side * THROW], axis=1) for side in (-1, 1)]
         return np.concatenate(rows) + TIME_IN_WIND * np.asarray(self.wind)
+
+
+# A rain rate over the ground.
+RainField = UniformRain | SprinkledRain
 
 
 def _unknown_rate_error(rate: float) -> InputError:
