@@ -17,7 +17,7 @@ from derain.simulation.layouts import LAYOUTS
 from derain.simulation.manifest import MAKER, RAIN_RATE, SPLIT_PARTS
 from derain.simulation.radar import Radar
 from derain.simulation.rain_field import UniformRain
-from derain.simulation.sensor import SELDOM_STATED, Sensor, load_sensor
+from derain.simulation.sensor import Sensor, load_sensor
 
 # Two of five sequences are clean, as are 39 % of REHEARSE-3D's. How often each rain rate occurs in
 # it is not published. The first sequence has rain, because it may be the only one to train on.
@@ -41,6 +41,13 @@ MOST_TRAFFIC = 20
 
 # Longest drive, metres: its street has one and a half million triangles and is laid out in 10 s.
 LONGEST = 2000.0
+
+
+# Attributes of a sensor that there were not from the beginning.
+LATER_ATTRIBUTES = (
+    *("row_azimuths", "pattern", "prism_turns", "tilt", "defects"),
+    *("range_noise_growth", "weak_range_noise", "encoder_noise"),
+)
 
 
 @dataclass(frozen=True)
@@ -262,7 +269,7 @@ class Campaign(SplitSequences):
         if self.drive is None:
             del campaign["drive"]  # as in the manifests of before there were drives
         usual = asdict(Sensor())
-        for name in SELDOM_STATED - {"row_inclinations"}:  # likewise
+        for name in LATER_ATTRIBUTES:  # likewise
             if campaign["sensor"][name] == usual[name]:
                 del campaign["sensor"][name]
         return self._described(campaign=campaign, split=self.split) | {RAIN_RATE: self.rain_rate}

@@ -30,14 +30,6 @@ MOST_TURNS = 1e6
 # Standard deviation of what a detector adds to every intensity, a modelling choice: one count.
 DARK_NOISE = 1.0
 
-# Attributes that most sensors have as they are by default: documents may leave them out.
-SELDOM_STATED = frozenset(
-    {
-        *("row_inclinations", "row_azimuths", "pattern", "prism_turns", "tilt"),
-        *("range_noise_growth", "weak_range_noise", "encoder_noise", "defects"),
-    }
-)
-
 # What a sensor reports of a beam that several things return.
 ReturnMode = Literal["strongest", "last", "dual"]
 
