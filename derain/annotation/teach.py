@@ -108,7 +108,8 @@ class Labelling(UnitJudging[LabelledScan]):
     def do(self, unit: FrameUnit) -> Iterator[LabelledScan]:
         """Labels the scans of a unit."""
         placed, doubts = self.placed(unit)
-        for labelled in self.results(placed.of(_without_labels), partial(self._labelled, placed)):
+        unlabelled = placed.of(lambda frames: [frame.without_labels() for frame in frames])
+        for labelled in self.results(unlabelled, partial(self._labelled, placed)):
             issues = [*doubts.get(labelled.frame.key, ()), *labelled.issues]
             yield replace(labelled, issues=issues)
 
@@ -146,10 +147,6 @@ class Labelling(UnitJudging[LabelledScan]):
                 issues.append(ScanIssue("own labels not measured", f"not measured: {error}"))
         answers = Answers.of(judgement.scan.with_label(labels), TAUGHT_CARD)
         return LabelledScan(frame, answers, dict(stopwatch.milliseconds), truth, issues)
-
-
-def _without_labels(frames: Sequence[Frame]) -> list[Frame]:
-    return [frame.without_labels() for frame in frames]
 
 
 # Receives each labelled scan.
@@ -327,17 +324,12 @@ def _put_in_place(folder: Path, out: Path, manifest: Manifest, card: DataCard | 
             earlier.unlink(missing_ok=True)
     for target, written in labels.items():
         with replacing(target) as temporary:
-            _link(written, temporary)
+            try:
+                os.link(written, temporary)
+            except OSError:  # a file system without links
+                shutil.copyfile(written, temporary)
     write_card(out / CARD, Path(manifest.teacher["method"]).stem, card)
     manifest.write(out)
-
-
-def _link(file: Path, name: Path) -> None:
-    """Gives a file another name."""
-    try:
-        os.link(file, name)
-    except OSError:  # a file system without links
-        shutil.copyfile(file, name)
 
 
 @contextmanager

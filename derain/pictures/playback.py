@@ -153,7 +153,9 @@ class PlaybackWriter:
         assert frame is not None  # the method was given frames, not points
         place = MethodEntities(title)
         labelled = None if self.labels is None else self.labels.of(frame, scan)
-        outcome = palette.outcomes(rain, _truth(labelled, rain))
+        # Where the truth is not known, what was called rain counts as rain.
+        truth = rain if labelled is None else np.where(labelled.known, labelled.rain, rain)
+        outcome = palette.outcomes(rain, truth)
         classed = (outcome + entities.CLASS_KEPT).astype(np.uint16)
         self._set_time(frame)
         for entity, rows in ((place.kept, scan.valid & ~rain), (place.removed, rain)):
@@ -255,8 +257,3 @@ def _meaning_of_rain(labels: Labels | None) -> str:
 def _escaped(text: str) -> str:
     """A name with Markdown's marks escaped."""
     return "".join(f"\\{c}" if c in "\\`*_{}[]<>()#+-!|" else c for c in printable(text))
-
-
-def _truth(labelled: LabelledRain | None, rain: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Points that are rain, bool (N,); where that is not known, those that were called rain."""
-    return rain if labelled is None else np.where(labelled.known, labelled.rain, rain)

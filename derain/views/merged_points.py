@@ -74,7 +74,8 @@ def are_one_return(
     row, place = np.nonzero(same)
     point, other = points[row], neighbours[row, place + 1]
     apart = distances[row, place + 1].astype(np.float64)
-    own, others = (_ranges(xyz.take(rows, axis=0)) for rows in (point, other))
+    places = (xyz.take(rows, axis=0).astype(np.float64) for rows in (point, other))
+    own, others = (np.linalg.norm(place, axis=1) for place in places)
     farther = others - own
     # The square of a chord is that of the difference of ranges, and 2 r r' (1 - cos) of the angle.
     same[row, place] = (
@@ -83,8 +84,3 @@ def are_one_return(
         & (point != other)  # the farthest point found fills up where there are few
     )
     return same
-
-
-def _ranges(xyz: NDArray[np.float32]) -> NDArray[np.float64]:
-    ranges: NDArray[np.float64] = np.linalg.norm(xyz.astype(np.float64), axis=1)
-    return ranges
