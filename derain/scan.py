@@ -25,6 +25,11 @@ FEWEST_ALIKE = 100
 # SemanticKITTI-style range images mark a cell without a return by -1 in every column.
 SENTINEL = -1.0
 
+# Arrays of any shape, which stands where they are described: float64, int64 and bool.
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
 Named = TypeVar("Named")
 
 # Ids of semantic classes have 16 bits. A label of 32 bits has its instance in the other 16.

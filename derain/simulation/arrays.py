@@ -1,4 +1,4 @@
-"""Types of arrays, and tables of them: the returns of the beams of a sensor."""
+"""Tables of arrays: the returns of the beams of a sensor."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
@@ -7,9 +7,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
+from derain.scan import Bools, Floats, Ints
 
 
 @dataclass(frozen=True, eq=False)

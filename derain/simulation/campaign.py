@@ -12,7 +12,7 @@ import numpy as np
 from derain import __version__
 from derain.errors import InputError
 from derain.files.documents import shown
-from derain.simulation.arrays import Floats
+from derain.scan import Floats
 from derain.simulation.layouts import LAYOUTS
 from derain.simulation.manifest import MAKER, RAIN_RATE, SPLIT_PARTS
 from derain.simulation.radar import Radar

@@ -2,7 +2,7 @@
 
 from enum import IntEnum
 
-from derain.simulation.arrays import Ints
+from derain.scan import Ints
 
 
 class TrackClass(IntEnum):

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.random import Generator
 
-from derain.simulation.arrays import Bools, Floats, Ints, Returns
+from derain.scan import Bools, Floats, Ints
+from derain.simulation.arrays import Returns
 from derain.simulation.classes import TrackClass, unpacked
 from derain.simulation.settings import Settings, Share
 

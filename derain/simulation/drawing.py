@@ -6,7 +6,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.random import Generator
 
-from derain.simulation.arrays import Floats
+from derain.scan import Floats
 
 T = TypeVar("T")
 

@@ -16,8 +16,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.random import Generator
 
+from derain.scan import Floats
 from derain.simulation import objects
-from derain.simulation.arrays import Floats
 from derain.simulation.classes import TrackClass
 from derain.simulation.objects import Surface
 from derain.simulation.track import Track

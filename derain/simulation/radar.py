@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
-from derain.scan import Scan
-from derain.simulation.arrays import Floats
+from derain.scan import Floats, Scan
 from derain.simulation.classes import TrackClass
 from derain.simulation.rain_field import EXTINCTION_EFFICIENCY, RainField, extinction
 from derain.simulation.sensor import Sensor

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
-from derain.simulation.arrays import Columns, Floats, Ints
+from derain.scan import Floats, Ints
+from derain.simulation.arrays import Columns
 from derain.simulation.classes import TrackClass
 from derain.simulation.rain_field import (
     LARGEST_DROP,

@@ -9,7 +9,7 @@ from numpy.random import Generator
 from numpy.typing import ArrayLike
 
 from derain.errors import InputError
-from derain.simulation.arrays import Floats
+from derain.scan import Floats
 
 # The facility's supply of water limits the product of rain rate and length of wet track, mm/h · m,
 # and its sprinklers limit that length, metres: it rains 10, 25 and 50 mm/h over 112, 56 and 28 m.

@@ -8,8 +8,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from derain.files.columns import intensity_name
-from derain.scan import Scan, to_float32
-from derain.simulation.arrays import Bools, Floats, Ints
+from derain.scan import Bools, Floats, Ints, Scan, to_float32
 from derain.simulation.classes import TrackClass
 from derain.simulation.rain import rain_on_beams
 from derain.simulation.rain_field import RainField

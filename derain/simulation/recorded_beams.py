@@ -7,8 +7,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from derain.scan import Scan
-from derain.simulation.arrays import Bools, Columns, Floats, Ints
+from derain.scan import Bools, Floats, Ints, Scan
+from derain.simulation.arrays import Columns
 from derain.simulation.sensor import unit_vectors
 from derain.views.directions import directions
 from derain.views.grid_fit import GridFit, fit_grid

@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.random import Generator
 
-from derain.simulation.arrays import Floats
+from derain.scan import Floats
 from derain.simulation.campaign import Campaign
 from derain.simulation.classes import packed
 from derain.simulation.layouts import LAYOUTS

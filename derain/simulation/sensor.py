@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike
 
 from derain.files.documents import Entry, packaged, packaged_or_own
 from derain.files.extrinsics import Extrinsics
-from derain.scan import Scan
-from derain.simulation.arrays import Floats, Ints
+from derain.scan import Floats, Ints, Scan
 from derain.simulation.arrays import Returns as Returns
 from derain.simulation.classes import TrackClass
 from derain.simulation.defects import Defects

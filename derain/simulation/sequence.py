@@ -33,8 +33,7 @@ from derain.files.extrinsics import POSE, Extrinsics
 from derain.files.frame_times import FRAME_COLUMNS, METADATA
 from derain.files.labels import write_labels
 from derain.fusion import NO_DETECTIONS, fuse, nearest_in_time
-from derain.scan import Scan, to_float32
-from derain.simulation.arrays import Floats
+from derain.scan import Floats, Scan, to_float32
 from derain.simulation.campaign import Campaign
 from derain.simulation.classes import unpacked
 from derain.simulation.radar import Radar, detect, mean_echoes

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from derain.simulation.arrays import Floats
+from derain.scan import Floats
 
 Triangles = Floats
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.simulation.arrays import Floats, Ints
+from derain.scan import Floats, Ints
 from derain.simulation.classes import TrackClass
 from derain.simulation.objects import Surface
 from derain.simulation.sensor import Returns, Sensor

@@ -9,8 +9,8 @@ from numpy.random import Generator
 
 from derain.errors import InputError
 from derain.files.extrinsics import POSE, Extrinsics
+from derain.scan import Floats
 from derain.simulation import objects
-from derain.simulation.arrays import Floats
 from derain.simulation.objects import Surface
 from derain.simulation.sensor import Sensor
 from derain.simulation.street import KERB, PAVEMENT, Street

@@ -21,9 +21,8 @@ from derain.files.labels import read_labels
 from derain.jobs.job import job_status
 from derain.jobs.shard import Shard
 from derain.jobs.workers import WorkerPool
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.simulation import sequence
-from derain.simulation.arrays import Bools
 from derain.simulation.campaign import Campaign
 from derain.simulation.classes import TrackClass
 from derain.simulation.dataset import simulate_track

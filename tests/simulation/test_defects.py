@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from derain.errors import InputError
-from derain.simulation.arrays import Floats, Returns
+from derain.scan import Floats
+from derain.simulation.arrays import Returns
 from derain.simulation.classes import TrackClass
 from derain.simulation.defects import SECTORS_OF_A_SCAN, Defects
 from derain.simulation.sensor import Sensor

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from derain.cli.simulate import LAYOUT_NAMES
-from derain.simulation.arrays import Floats, Ints
+from derain.scan import Floats, Ints
 from derain.simulation.classes import TrackClass
 from derain.simulation.layouts import LAYOUTS
 from derain.simulation.places.carrier import lay_out_carrier

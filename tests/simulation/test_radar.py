@@ -6,9 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from derain.scan import Scan
+from derain.scan import Ints, Scan
 from derain.simulation import shapes
-from derain.simulation.arrays import Ints
 from derain.simulation.classes import TrackClass
 from derain.simulation.facility import lay_out_track
 from derain.simulation.objects import Surface

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from numpy.random import Generator
 from scipy.stats import kstest, truncexpon
 
+from derain.scan import Floats
 from derain.simulation import rain as rain_module
-from derain.simulation.arrays import Floats
 from derain.simulation.classes import TrackClass
 from derain.simulation.rain import (
     DROP_REFLECTIVITY,

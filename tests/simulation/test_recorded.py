@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from derain.evaluation.hard_cases import hard_cases
 from derain.files import read_scan
 from derain.files.columns import scan_of
-from derain.scan import Scan
-from derain.simulation.arrays import Bools
+from derain.scan import Bools, Scan
 from derain.simulation.classes import TrackClass
 from derain.simulation.rain import DROP_REFLECTIVITY, farthest_visible_drop
 from derain.simulation.rain_field import UniformRain

@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from derain.files import read_scan
-from derain.scan import Scan
-from derain.simulation.arrays import Bools, Floats
+from derain.scan import Bools, Floats, Scan
 from derain.simulation.recorded_beams import RecordedBeams, find_beams, in_hull
 from derain.simulation.sensor import Sensor
 

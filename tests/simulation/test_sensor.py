@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from derain.errors import InputError
-from derain.simulation.arrays import Floats
+from derain.scan import Floats
 from derain.simulation.sensor import SELDOM_STATED, Sensor, load_sensor, packaged_sensors
 
 from .surfaces import random_surfaces, surfaces

@@ -6,7 +6,8 @@ from typing import Self
 import numpy as np
 from numpy.random import Generator
 
-from derain.simulation.arrays import Columns, Floats, Ints
+from derain.scan import Floats, Ints
+from derain.simulation.arrays import Columns
 from derain.simulation.classes import TrackClass
 from derain.simulation.flying.optics import Optics, Sizes, Slices
 from derain.simulation.flying.particles import OpenBeams, Stretch, draw_particles

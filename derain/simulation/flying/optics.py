@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 from numpy.random import Generator
 
-from derain.simulation.arrays import Floats
+from derain.scan import Floats
 from derain.simulation.flying.precipitation import SMALLEST, Precipitation
 from derain.simulation.sensor import Sensor
 

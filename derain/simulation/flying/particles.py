@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
-from derain.simulation.arrays import Bools, Columns, Floats, Ints
+from derain.scan import Bools, Floats, Ints
+from derain.simulation.arrays import Columns
 from derain.simulation.flying.optics import Optics, Sizes, Slices
 from derain.system.cores import sleeping_threads
 

@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.random import Generator
 
-from derain.simulation.arrays import Floats
+from derain.scan import Floats
 from derain.simulation.classes import TrackClass, unpacked
 from derain.simulation.flying.particles import Stretch
 from derain.simulation.flying.precipitation import GustForm

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.random import Generator
 
-from derain.simulation.arrays import Floats, Ints
+from derain.scan import Floats, Ints
 from derain.simulation.drawing import along
 from derain.simulation.objects import Surface
 from derain.simulation.places import ground, openwork, placing, plants

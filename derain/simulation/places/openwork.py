@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.random import Generator
 
+from derain.scan import Floats
 from derain.simulation import shapes
-from derain.simulation.arrays import Floats
 from derain.simulation.drawing import Span, log_uniform
 from derain.simulation.objects import Surface, of_material
 from derain.simulation.shapes import Point, Triangles, bars

@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.random import Generator
 
+from derain.scan import Floats
 from derain.simulation import objects, shapes
-from derain.simulation.arrays import Floats
 from derain.simulation.drawing import Span, log_uniform
 from derain.simulation.objects import Make, Options, Piece, Surface, of_size
 from derain.simulation.places import ground, openwork, plants, road_users

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.random import Generator
 
+from derain.scan import Floats
 from derain.simulation import shapes
-from derain.simulation.arrays import Floats
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import log_uniform, log_uniforms
 from derain.simulation.objects import Surface

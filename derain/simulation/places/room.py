@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.random import Generator
 
+from derain.scan import Bools
 from derain.simulation import shapes
-from derain.simulation.arrays import Bools
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import log_uniform
 from derain.simulation.objects import Options, Surface, mirrored, of_size

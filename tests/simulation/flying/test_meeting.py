@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from derain.simulation.arrays import Floats
+from derain.scan import Floats
 from derain.simulation.classes import TrackClass
 from derain.simulation.flying.meeting import Encounters, covered_share, draw_haze, meet, uncrowded
 from derain.simulation.flying.optics import Optics, Sizes, Slices

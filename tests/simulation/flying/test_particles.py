@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from derain.simulation.arrays import Floats
+from derain.scan import Floats
 from derain.simulation.flying import particles as particles_module
 from derain.simulation.flying.optics import Optics, Sizes, Slices
 from derain.simulation.flying.particles import OpenBeams, Particles, Stretch, draw_particles
