@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.scan import Bools, Floats, Ints
+
 # Pixels on each side of a point's own that a back-projection may choose from: a window of
 # 5 × 5.
 # Source: Milioto et al. 2019, RangeNet++; github.com/TiagoCortinhal/SalsaNext, salsanext.yml.
@@ -50,7 +52,7 @@ class ProjectedPoints:
         wraps: True where the last column is the neighbour of the first.
     """
 
-    pixel: NDArray[np.int64]
+    pixel: Ints
     range: NDArray[np.float32]
     nearest: NDArray[np.float32]
     wraps: bool
@@ -158,9 +160,7 @@ class _Window:
             rows[:, -REACH:] = image.take(range(width, width + REACH), axis=1, mode="wrap")
         return padded.ravel()
 
-    def closest_in_range(
-        self, pixel: NDArray[np.int64], distance: NDArray[np.float32]
-    ) -> NDArray[np.int64]:
+    def closest_in_range(self, pixel: Ints, distance: NDArray[np.float32]) -> Ints:
         """The pixel around each pixel that shows the range most like a point's, int64 (N,)."""
         best = np.zeros(len(pixel), np.uint8)
         least = np.full(len(pixel), np.inf, np.float32)
@@ -174,12 +174,10 @@ class _Window:
         column = pixel - row * self._width + right.take(best)
         if self._wraps:
             column %= self._width
-        chosen: NDArray[np.int64] = (row + down.take(best)) * self._width + column
+        chosen: Ints = (row + down.take(best)) * self._width + column
         return chosen
 
-    def share_of_votes(
-        self, pixel: NDArray[np.int64], distance: NDArray[np.float32], rain: NDArray[np.bool_]
-    ) -> NDArray[np.float64]:
+    def share_of_votes(self, pixel: Ints, distance: NDArray[np.float32], rain: Bools) -> Floats:
         """Share of rain among the votes of the pixels around each pixel, float64 (N,)."""
         corner = self._corner(pixel)
         voters = np.empty((len(pixel), len(WINDOW_STEPS)), VOTER)
@@ -192,18 +190,18 @@ class _Window:
         chosen = np.ascontiguousarray(chosen.T).view(VOTER)
         votes = chosen["difference"] <= CUTOFF
         for_rain = chosen["ballot"] % 2 == 1
-        share: NDArray[np.float64] = (votes & for_rain).sum(axis=0) / votes.sum(axis=0)
+        share: Floats = (votes & for_rain).sum(axis=0) / votes.sum(axis=0)
         return share
 
     def _differences(
-        self, pixel: NDArray[np.int64], distance: NDArray[np.float32]
+        self, pixel: Ints, distance: NDArray[np.float32]
     ) -> Iterator[NDArray[np.float32]]:
         """Differences in range between the pixels around each pixel and a point, step by step."""
         corner = self._corner(pixel)
         for step in self._steps:
             yield np.abs(self._nearest[step:].take(corner) - distance)
 
-    def _corner(self, pixel: NDArray[np.int64]) -> NDArray[np.int64]:
+    def _corner(self, pixel: Ints) -> Ints:
         """Start of the window around each pixel in the padded image, int64 (N,)."""
-        corner: NDArray[np.int64] = pixel + pixel // self._width * (2 * REACH)
+        corner: Ints = pixel + pixel // self._width * (2 * REACH)
         return corner

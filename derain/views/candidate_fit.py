@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.views.candidates import Bound, Candidates, bounded_channels
 from derain.views.channels import channel_values
 from derain.views.morton import first_rows
@@ -28,9 +28,7 @@ DIGITS = 3
 
 
 def fit_candidates(
-    scans: Iterable[tuple[Scan, NDArray[np.bool_]]],
-    channels: Sequence[str],
-    inside: float = RAIN_INSIDE,
+    scans: Iterable[tuple[Scan, Bools]], channels: Sequence[str], inside: float = RAIN_INSIDE
 ) -> Candidates | None:
     """Finds bounds that hold a stated share of the rain with a margin, and leave out what they can.
 
@@ -98,7 +96,7 @@ class _Side:
     channel: str
     is_most: bool
     values: NDArray[np.float32]
-    rain: NDArray[np.bool_]
+    rain: Bools
 
     def limit(self, outside: float) -> float:
         """The limit above which nothing is rain; infinite if too little rain has a value.
@@ -116,14 +114,14 @@ class _Side:
         ).astype(float)
         return _rounded_up(edge + (edge - before) * (1 + math.log10(tail / outside)))
 
-    def leaves_out(self, limit: float) -> NDArray[np.bool_]:
+    def leaves_out(self, limit: float) -> Bools:
         """True for points above a limit, bool (M,)."""
         return self.values > np.float32(limit)
 
 
 def _gathered(
-    scans: Iterable[tuple[Scan, NDArray[np.bool_]]], channels: Sequence[str]
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    scans: Iterable[tuple[Scan, Bools]], channels: Sequence[str]
+) -> tuple[NDArray[np.float32], Bools]:
     """Values of all distinct positions, float32 (C, M), and which are rain, bool (M,)."""
     values, rain = [np.zeros((len(channels), 0), np.float32)], [np.zeros(0, bool)]
     for scan, is_rain in scans:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.files.documents import Entry
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.views.channels import MOST_CHANNELS
 
 # Bounds are compared as float32, as which a larger number would be infinite.
@@ -29,7 +29,7 @@ class Bound:
     least: float | None = None
     most: float | None = None
 
-    def holds(self, values: NDArray[np.float32]) -> NDArray[np.bool_]:
+    def holds(self, values: NDArray[np.float32]) -> Bools:
         """True for values within the bound, bool (N,); also True for unknown values, NaN."""
         outside = np.zeros(len(values), bool)
         # Nothing is less or greater than NaN. A bound as float32 compares as fast as can be.
@@ -65,7 +65,7 @@ class Candidates:
     rain: float = 1.0
     rain_share: float = 0.0
 
-    def among(self, scan: Scan) -> NDArray[np.bool_]:
+    def among(self, scan: Scan) -> Bools:
         """True for rows of a scan that are candidates.
 
         A missing channel or value excludes no point.

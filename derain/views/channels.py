@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.scan import Scan
+from derain.scan import Ints, Scan
 
 # The default channels of networks. All other channels are extra: a scan need not have them, and a
 # data card has their statistics only after a network has used them.
@@ -39,9 +39,7 @@ def with_columns(scan: Scan, channels: Sequence[str]) -> Scan:
     return replace(scan, fields=present)
 
 
-def channel_values(
-    scan: Scan, rows: NDArray[np.int64], channels: Sequence[str]
-) -> NDArray[np.float32]:
+def channel_values(scan: Scan, rows: Ints, channels: Sequence[str]) -> NDArray[np.float32]:
     """Values of a channel at some points of a scan.
 
     Args:
@@ -59,10 +57,7 @@ def channel_values(
 
 
 def filled_values(
-    scan: Scan,
-    rows: NDArray[np.int64],
-    channels: Sequence[str],
-    fill_value: Mapping[str, float],
+    scan: Scan, rows: Ints, channels: Sequence[str], fill_value: Mapping[str, float]
 ) -> NDArray[np.float32]:
     """Values of channels at some points of a scan, with replacements for missing ones.
 
@@ -86,10 +81,7 @@ def filled_values(
 
 
 def channel_image(
-    scan: Scan,
-    winner: NDArray[np.int64],
-    channels: Sequence[str],
-    fill_value: Mapping[str, float],
+    scan: Scan, winner: Ints, channels: Sequence[str], fill_value: Mapping[str, float]
 ) -> NDArray[np.float32]:
     """Values of channels in the pixels of an image, with replacements for missing ones.
 

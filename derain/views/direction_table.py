@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.scan import Floats, Ints
+
 # Bins of each table. A grid of 2048 columns leaves 32 of them to a column, one of which is unsure.
 BINS = 2**16
 
@@ -33,7 +35,7 @@ SQUARED_RANGES = (1e-20, 1e20)
 POINTS_AT_A_TIME = 2**14
 
 # Maps angles, float64 (M,), degrees, to rows or columns of a grid, int64 (M,).
-OfAngles = Callable[[NDArray[np.float64]], NDArray[np.int64]]
+OfAngles = Callable[[Floats], Ints]
 
 
 class DirectionTable:
@@ -47,11 +49,7 @@ class DirectionTable:
     """
 
     def __init__(
-        self,
-        inclinations: NDArray[np.float64],
-        first_pixel: OfAngles,
-        azimuths: NDArray[np.float64],
-        column: OfAngles,
+        self, inclinations: Floats, first_pixel: OfAngles, azimuths: Floats, column: OfAngles
     ) -> None:
         middles = np.arange(BINS) + 0.5
         inclinations, azimuths = np.radians(inclinations), np.radians(azimuths)
@@ -60,7 +58,7 @@ class DirectionTable:
         self._first_pixels = _table(first_pixel(_inclination(middles)), heights)
         self._columns = _table(column(_azimuth(middles)), turns)
 
-    def __call__(self, xyz: NDArray[np.float32]) -> NDArray[np.int64]:
+    def __call__(self, xyz: NDArray[np.float32]) -> Ints:
         """Looks up points.
 
         Args:
@@ -90,7 +88,7 @@ class DirectionTable:
         return pixel
 
 
-def _table(of_bins: NDArray[np.int64], borders: NDArray[np.float64]) -> NDArray[np.int32]:
+def _table(of_bins: Ints, borders: Floats) -> NDArray[np.int32]:
     """The entry of each bin, int32 (BINS + 1,): the last is for the value BINS itself."""
     table = np.append(of_bins, UNSURE).astype(np.int32)
     for near in (borders - BORDER_MARGIN, borders + BORDER_MARGIN):
@@ -105,7 +103,7 @@ def height_of(z: NDArray[Any], distance: NDArray[Any] | float) -> NDArray[Any]:
     return (z / distance + 1) * (BINS // 2)
 
 
-def _inclination(height: NDArray[Any]) -> NDArray[np.float64]:
+def _inclination(height: NDArray[Any]) -> Floats:
     """Inclination of a height, degrees."""
     return np.degrees(np.arcsin(height / (BINS // 2) - 1))
 
@@ -119,9 +117,9 @@ def turn_of(x: NDArray[Any], y: NDArray[Any]) -> NDArray[Any]:
     return distance * (BINS // 4)
 
 
-def _azimuth(turn: NDArray[Any]) -> NDArray[np.float64]:
+def _azimuth(turn: NDArray[Any]) -> Floats:
     """Azimuth of a turn, degrees."""
     distance = turn / (BINS // 4) - 2
     x = 1 - np.abs(distance)
-    azimuth: NDArray[np.float64] = np.degrees(np.arctan2(np.copysign(1 - np.abs(x), distance), x))
+    azimuth: Floats = np.degrees(np.arctan2(np.copysign(1 - np.abs(x), distance), x))
     return azimuth

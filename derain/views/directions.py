@@ -8,6 +8,8 @@ a rosette, of several sensors or of a shaken one do, there are about as many a l
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.scan import Bools, Floats, Ints
+
 # Returns of one ray differ by at most this much in direction, degrees: by the rounding of
 # coordinates to float32, or to millimetres. Of these the largest counts at which the returns of
 # one ray stand out, which is where neighbouring rays are out of reach.
@@ -27,7 +29,7 @@ CLEARLY_MORE = 5
 SLAB_SPACING = 1000
 
 
-def directions(xyz: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def directions(xyz: NDArray[np.float32]) -> tuple[Floats, Floats]:
     """Azimuth and inclination of every point.
 
     Args:
@@ -46,7 +48,7 @@ def directions(xyz: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[n
     return azimuth, inclination
 
 
-def shared_direction_pairs(xyz: NDArray[np.float32], evident: bool = True) -> NDArray[np.int64]:
+def shared_direction_pairs(xyz: NDArray[np.float32], evident: bool = True) -> Ints:
     """Pairs of points that lie in one direction from the sensor.
 
     Args:
@@ -70,9 +72,7 @@ def shared_direction_pairs(xyz: NDArray[np.float32], evident: bool = True) -> ND
     return pairs[_uncrowded(pairs, gap <= TOLERANCES[-2], len(xyz))]
 
 
-def _near_pairs(
-    azimuth: NDArray[np.float64], inclination: NDArray[np.float64], tolerance: float
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _near_pairs(azimuth: Floats, inclination: Floats, tolerance: float) -> tuple[Ints, Floats]:
     """Pairs of directions that differ by at most a tolerance, and by how much.
 
     Args:
@@ -94,8 +94,8 @@ def _near_pairs(
 
 
 def _pairs_in_slabs(
-    azimuth: NDArray[np.float64], inclination: NDArray[np.float64], tolerance: float, shift: float
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    azimuth: Floats, inclination: Floats, tolerance: float, shift: float
+) -> tuple[Ints, Floats]:
     """Those of the pairs of :func:`_near_pairs` that lie in one slab, each pair once.
 
     Args:
@@ -121,11 +121,8 @@ def _pairs_in_slabs(
 
 
 def _laid_end_to_end(
-    azimuth: NDArray[np.float64],
-    slab: NDArray[np.float64],
-    middle: NDArray[np.float64],
-    tolerance: float,
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    azimuth: Floats, slab: Floats, middle: Floats, tolerance: float
+) -> tuple[Ints, Floats]:
     """Directions in the order of their places on one line, which holds slab after slab.
 
     Args:
@@ -149,7 +146,7 @@ def _laid_end_to_end(
     return point[order], place[order]
 
 
-def _uncrowded(pairs: NDArray[np.int64], near: NDArray[np.bool_], points: int) -> NDArray[np.bool_]:
+def _uncrowded(pairs: Ints, near: Bools, points: int) -> Bools:
     """Those of the near pairs whose points are in fewer than MOST_RETURNS of them, bool (P,)."""
     crowded = np.bincount(pairs[near].ravel(), minlength=points) >= MOST_RETURNS
     return near & ~crowded[pairs].any(axis=1)

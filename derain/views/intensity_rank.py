@@ -3,13 +3,13 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.scan import Scan
+from derain.scan import Ints, Scan
 
 # Steps in which intensities are ranked.
 INTENSITY_RANKS = 32
 
 
-def intensity_rank(scan: Scan) -> NDArray[np.int64]:
+def intensity_rank(scan: Scan) -> Ints:
     """Ranks of the points of a scan by their intensity.
 
     Every intensity that occurs counts by the root of how often it does: where most of the points
@@ -33,7 +33,7 @@ def intensity_rank(scan: Scan) -> NDArray[np.int64]:
     return edges_reached(intensity, edges)
 
 
-def edges_reached(values: NDArray[np.float32], edges: NDArray[np.float32]) -> NDArray[np.int64]:
+def edges_reached(values: NDArray[np.float32], edges: NDArray[np.float32]) -> Ints:
     """Number of edges that are no greater than each value.
 
     Args:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.files.documents import Entry
-from derain.scan import Scan
+from derain.scan import Floats, Ints, Scan
 from derain.views.intensity_rank import INTENSITY_RANKS, edges_reached, intensity_rank
 from derain.views.merged_points import are_one_return, merged_points
 from derain.views.morton import distinct_rows
@@ -77,7 +77,7 @@ class IsolatedPoints(ViewedPoints):
         inverse: Point of each row of the scan, int64 (N,); -1 for rows at no point.
     """
 
-    cell: NDArray[np.int64]
+    cell: Ints
     step: NDArray[np.float32]
     counts: NDArray[np.float32]
 
@@ -144,7 +144,7 @@ class IsolatedPointView(View):
 
     def _returns(
         self, scan: Scan
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32], NeighbourSearch, float]:
+    ) -> tuple[Ints, Ints, NDArray[np.float32], NeighbourSearch, float]:
         """The distinct returns of a scan, and the step between its beams.
 
         Returns:
@@ -163,7 +163,7 @@ class IsolatedPointView(View):
         return first, inverse, xyz, search, step
 
     def _searched(
-        self, xyz: NDArray[np.float32], first: NDArray[np.int64]
+        self, xyz: NDArray[np.float32], first: Ints
     ) -> tuple[NeighbourSearch, float, bool]:
         """The neighbour search, the step, and whether some returns are written more than once.
 
@@ -177,7 +177,7 @@ class IsolatedPointView(View):
         return search, beam_step(xyz, some, neighbours), bool(doubled)
 
 
-def _cells(xyz: NDArray[np.float32], rank: NDArray[np.int64]) -> NDArray[np.int64]:
+def _cells(xyz: NDArray[np.float32], rank: Ints) -> Ints:
     """Shell and rank of each point together, int64 (M,).
 
     Args:
@@ -190,9 +190,7 @@ def _cells(xyz: NDArray[np.float32], rank: NDArray[np.int64]) -> NDArray[np.int6
     return shell * INTENSITY_RANKS + rank
 
 
-def beam_step(
-    xyz: NDArray[np.float32], rows: NDArray[np.int64], neighbours: NDArray[np.int64]
-) -> float:
+def beam_step(xyz: NDArray[np.float32], rows: Ints, neighbours: Ints) -> float:
     """The angle between neighbouring beams, by what lies near some points.
 
     Args:
@@ -214,11 +212,11 @@ def beam_step(
     return max(float(np.sqrt(np.median(chords))), FINEST_STEP)
 
 
-def _directions(xyz: NDArray[np.float32]) -> NDArray[np.float64]:
+def _directions(xyz: NDArray[np.float32]) -> Floats:
     """Unit vectors to some points, float64 (3, Q)."""
     axes = np.array(xyz.T, np.float64, order="C")
     length = np.maximum(np.sqrt(np.square(axes).sum(axis=0)), NEAREST_POINT)
-    directions: NDArray[np.float64] = axes / length
+    directions: Floats = axes / length
     return directions
 
 

@@ -8,6 +8,8 @@ those at exactly one position hold none.
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.scan import Bools, Ints
+
 # Two points are one return where their ranges differ by no more than this, metres, and their
 # directions by no more than this, radians. LiDARs measure ranges to 1 to 3 cm, and neighbouring
 # rays are at least three times as far apart, in all but the finest sensors.
@@ -17,11 +19,8 @@ SAME_RAY = 4e-4
 
 
 def merged_points(
-    xyz: NDArray[np.float32],
-    rows: NDArray[np.int64],
-    neighbours: NDArray[np.int64],
-    distances: NDArray[np.float32],
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    xyz: NDArray[np.float32], rows: Ints, neighbours: Ints, distances: NDArray[np.float32]
+) -> tuple[Ints, Ints]:
     """Finds which points of a scan are one return.
 
     Each is one with the point of the lowest row among those that it is one return with.
@@ -54,11 +53,8 @@ def merged_points(
 
 
 def are_one_return(
-    xyz: NDArray[np.float32],
-    points: NDArray[np.int64],
-    neighbours: NDArray[np.int64],
-    distances: NDArray[np.float32],
-) -> NDArray[np.bool_]:
+    xyz: NDArray[np.float32], points: Ints, neighbours: Ints, distances: NDArray[np.float32]
+) -> Bools:
     """True for neighbours of some points that are one return with them.
 
     Args:

@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.scan import Scan
+from derain.scan import Bools, Ints, Scan
 
 BITS_PER_AXIS = 16
 
@@ -54,7 +54,7 @@ def morton_code(xyz: NDArray[np.float32]) -> NDArray[np.uint64]:
     return code
 
 
-def distinct_positions(xyz: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def distinct_positions(xyz: NDArray[np.float32]) -> tuple[Ints, Ints]:
     """Finds the positions that differ; points with exactly equal coordinates share one.
 
     Dual-return sensors write the same point twice (40 % of a raw WADS scan): such copies add
@@ -90,18 +90,16 @@ def distinct_positions(xyz: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDA
     return order[new], inverse
 
 
-def _differ(
-    xyz: NDArray[np.float32], order: NDArray[np.int64], places: NDArray[np.int64]
-) -> NDArray[np.bool_]:
+def _differ(xyz: NDArray[np.float32], order: Ints, places: Ints) -> Bools:
     """True if points at some places of an order are elsewhere than those before them, bool (Q,)."""
     own = xyz.take(order[places], axis=0)
     before = xyz.take(order[places - 1], axis=0)
     x, y, z = (own != before).T
-    result: NDArray[np.bool_] = x | y | z
+    result: Bools = x | y | z
     return result
 
 
-def _ascending(code: NDArray[np.uint64]) -> NDArray[np.int64]:
+def _ascending(code: NDArray[np.uint64]) -> Ints:
     """The permutation that sorts cell numbers, int64 (N,); equal ones keep their order."""
     # NumPy sorts 16 bits by radix, which thrice is twice as fast as sorting 48 by comparison.
     order = np.argsort(code.astype(np.uint16), kind="stable")
@@ -111,7 +109,7 @@ def _ascending(code: NDArray[np.uint64]) -> NDArray[np.int64]:
     return order
 
 
-def distinct_rows(scan: Scan) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def distinct_rows(scan: Scan) -> tuple[Ints, Ints]:
     """Finds the distinct positions of the rows that can be judged.
 
     Args:
@@ -131,12 +129,10 @@ def distinct_rows(scan: Scan) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 
 # Views, rays and pairs of returns ask in turn about the same scan.
-_of_last_scan: WeakKeyDictionary[Scan, tuple[NDArray[np.int64], NDArray[np.int64]]] = (
-    WeakKeyDictionary()
-)
+_of_last_scan: WeakKeyDictionary[Scan, tuple[Ints, Ints]] = WeakKeyDictionary()
 
 
-def _distinct_rows(scan: Scan) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _distinct_rows(scan: Scan) -> tuple[Ints, Ints]:
     valid = np.flatnonzero(scan.valid)
     # take is four times faster than indexing for rows of three numbers.
     first, position = distinct_positions(scan.xyz.take(valid, axis=0))
@@ -151,7 +147,7 @@ def _distinct_rows(scan: Scan) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return first, inverse
 
 
-def first_rows(scan: Scan) -> NDArray[np.int64]:
+def first_rows(scan: Scan) -> Ints:
     """The first row at each distinct position, ascending; the rest as :func:`distinct_rows`.
 
     Args:
@@ -163,7 +159,7 @@ def first_rows(scan: Scan) -> NDArray[np.int64]:
     return np.sort(distinct_rows(scan)[0])
 
 
-def evenly(rows: NDArray[np.int64], most: int) -> NDArray[np.int64]:
+def evenly(rows: Ints, most: int) -> Ints:
     """Some of the rows, evenly along them: of points along a curve, some of every place.
 
     Args:

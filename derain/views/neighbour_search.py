@@ -3,13 +3,14 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.scan import Floats, Ints
 from derain.system.cores import sleeping_threads, threads_of
 
 with sleeping_threads():
     import small_gicp
 
 # Rows of points, and squared distances to them in square metres.
-Found = tuple[NDArray[np.int64], NDArray[np.float64]]
+Found = tuple[Ints, Floats]
 
 
 class NeighbourSearch:
@@ -25,19 +26,14 @@ class NeighbourSearch:
     """
 
     def __init__(
-        self,
-        xyz: NDArray[np.float32],
-        rank: NDArray[np.int64] | None = None,
-        threads: int = 0,
+        self, xyz: NDArray[np.float32], rank: Ints | None = None, threads: int = 0
     ) -> None:
         self._xyz = xyz.astype(np.float64)
         self._rank = np.arange(len(xyz)) if rank is None else rank
         self._threads = threads_of(threads)
         self._tree = small_gicp.KdTree(self._xyz, num_threads=self._threads) if len(xyz) else None
 
-    def __call__(
-        self, k: int, queries: NDArray[np.int64] | None = None
-    ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    def __call__(self, k: int, queries: Ints | None = None) -> tuple[Ints, NDArray[np.float32]]:
         """Finds the k nearest neighbours of some of the points.
 
         Each row starts with the point itself and ascends in distance; of equally near neighbours
@@ -69,7 +65,7 @@ class NeighbourSearch:
             squared = np.pad(squared, missing, mode="edge")
         return rows, np.sqrt(squared.astype(np.float32))
 
-    def nearest(self, queries: NDArray[np.int64] | None, k: int) -> Found:
+    def nearest(self, queries: Ints | None, k: int) -> Found:
         """Finds nearest neighbours, equally near ones in whatever order.
 
         Args:
@@ -86,7 +82,7 @@ class NeighbourSearch:
         rows, squared = self._tree.batch_knn_search(places, k, num_threads=self._threads)
         return rows.view(np.int64), squared
 
-    def _in_order(self, near: Found, queries: NDArray[np.int64], k: int) -> Found:
+    def _in_order(self, near: Found, queries: Ints, k: int) -> Found:
         """Puts equally near neighbours in ascending rank.
 
         A tie across the k-th place may go on behind the last neighbour found: there, more of them
@@ -113,7 +109,7 @@ class NeighbourSearch:
             near = self.nearest(queries[pending], min(2 * width, len(self._xyz)))
 
 
-def _rows_with_equals(ascending: NDArray[np.float64]) -> NDArray[np.int64]:
+def _rows_with_equals(ascending: Floats) -> Ints:
     """Numbers of the rows in which a value is equal to the one before it, int64.
 
     Args:

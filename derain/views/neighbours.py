@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.files.documents import Entry
-from derain.scan import Scan
+from derain.scan import Bools, Ints, Scan
 from derain.views.candidates import Candidates
 from derain.views.channels import filled_values
 from derain.views.morton import distinct_rows
@@ -35,17 +35,17 @@ class ViewedPoints(ViewedScan):
     """
 
     points: NDArray[np.float32]
-    neighbours: NDArray[np.int64]
+    neighbours: Ints
     distances: NDArray[np.float32]
-    first: NDArray[np.int64]
-    inverse: NDArray[np.int64]
+    first: Ints
+    inverse: Ints
 
     @property
-    def judged(self) -> NDArray[np.bool_]:
+    def judged(self) -> Bools:
         """True for rows of the scan at some point, bool (N,); not rain where it is not scored."""
         return self.inverse >= 0
 
-    def target(self, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
+    def target(self, rain: Bools) -> Ints:
         """Training target of each point that is scored.
 
         Args:
@@ -73,7 +73,7 @@ class ViewedPoints(ViewedScan):
         return {name: np.concatenate([one[name] for one in inputs]) for name in inputs[0]}
 
     @property
-    def _scored(self) -> NDArray[np.int64]:
+    def _scored(self) -> Ints:
         """Each point that is scored as a row of ``points``, int64 (J,)."""
         if self.size == len(self.points):
             return np.arange(self.size)  # faster than to read them, each far from the next
@@ -104,7 +104,7 @@ class Neighbourhoods(ViewedPoints):
             its own, as rows of ``neighbours``, int64 (J, k). None where all points are scored.
     """
 
-    candidates: NDArray[np.int64] | None = None
+    candidates: Ints | None = None
 
     @property
     def varying(self) -> Mapping[str, str]:
@@ -191,8 +191,8 @@ def neighbours_at(entry: Entry) -> int:
 
 
 def _around(
-    search: NeighbourSearch, candidate: NDArray[np.bool_], k: int
-) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.int64]]:
+    search: NeighbourSearch, candidate: Bools, k: int
+) -> tuple[Ints, NDArray[np.float32], Ints]:
     """Neighbourhoods of candidates, and of all points in them.
 
     Args:
@@ -221,10 +221,7 @@ def _around(
 
 
 def _to_rows(
-    inverse: NDArray[np.int64],
-    scored: NDArray[np.int64],
-    points: int,
-    score: NDArray[np.float32],
+    inverse: Ints, scored: Ints, points: int, score: NDArray[np.float32]
 ) -> NDArray[np.float32]:
     """Gives each row of a scan the score of its point.
 

@@ -10,14 +10,13 @@ sensor that sees no ground, or is less than 1.3 m above it, pass for metres.
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-from derain.scan import LARGEST_COORDINATE, Scan
+from derain.scan import LARGEST_COORDINATE, Bools, Floats, Scan
 from derain.views.morton import MOST_COPIES
 from derain.views.scan_issues import ScanIssue
 
 # Azimuth, inclination and range of points, float64 (3, M).
-Rays = NDArray[np.float64]
+Rays = Floats
 
 # A scan with fewer points, or a smaller share of valid rows, is too small to check.
 FEWEST_RETURNS = 50
@@ -127,13 +126,13 @@ def _map_issue(scan: Scan) -> Iterator[ScanIssue]:
         )
 
 
-def _commonest(sample: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
+def _commonest(sample: Floats) -> tuple[Floats, int]:
     """The position, float64 (3,), that most of the points, float64 (M, 3), share; their number."""
     positions, times = np.unique(sample, axis=0, return_counts=True)
     return positions[times.argmax()], int(times.max())
 
 
-def _no_returns_issue(scan: Scan, position: NDArray[np.float64]) -> ScanIssue:
+def _no_returns_issue(scan: Scan, position: Floats) -> ScanIssue:
     """The issue of a scan with many points at one position, float64 (3,)."""
     number = np.count_nonzero((scan.xyz == position).all(axis=1))
     x, y, z = position
@@ -145,7 +144,7 @@ def _no_returns_issue(scan: Scan, position: NDArray[np.float64]) -> ScanIssue:
     )
 
 
-def _off_centre_issue(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
+def _off_centre_issue(sample: Floats) -> Iterator[ScanIssue]:
     """Yields an issue if points, float64 (M, 3), lie together, far from the origin."""
     centre = np.median(sample, axis=0)
     around = float(np.median(np.linalg.norm(sample - centre, axis=1)))
@@ -159,7 +158,7 @@ def _off_centre_issue(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
         )
 
 
-def _unit_issue(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
+def _unit_issue(sample: Floats) -> Iterator[ScanIssue]:
     """Yields an issue if points, float64 (M, 3), are farther off or nearer than in metres."""
     range_ = np.linalg.norm(sample, axis=1)
     far, near = np.percentile(range_, [FAR_PERCENTILE, 99])
@@ -190,7 +189,7 @@ def _unit_issue(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
         )
 
 
-def _height(sample: NDArray[np.float64]) -> float:
+def _height(sample: Floats) -> float:
     """Depth of the ground below the sensor, metres; points are float64 (M, 3). NaN if unseen."""
     x, y, z = sample.T
     below = z[z < np.tan(np.radians(BELOW_HORIZON)) * np.hypot(x, y)]
@@ -199,7 +198,7 @@ def _height(sample: NDArray[np.float64]) -> float:
     return -float(np.percentile(below, GROUND_PERCENTILE))
 
 
-def _single_beam_issue(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
+def _single_beam_issue(sample: Floats) -> Iterator[ScanIssue]:
     """Yields an issue if points, float64 (M, 3), are all of one plane or cone of rays."""
     rays = sample / np.linalg.norm(sample, axis=1, keepdims=True)
     lowest, highest = np.degrees(np.arcsin(np.percentile(rays[:, 2], [1, 99]).clip(-1, 1)))
@@ -295,7 +294,7 @@ def range_step(rays: Rays) -> float:
     return float(np.expm1(np.median(np.abs(np.diff(np.log(range_))[neighbours]))))
 
 
-def _near_axes(scan: Scan) -> NDArray[np.bool_]:
+def _near_axes(scan: Scan) -> Bools:
     """True for points that are near the x and y axes and the diagonals between them, bool (N,)."""
     near = np.zeros(len(scan), bool)
     x, y = np.ascontiguousarray(scan.xyz[:, :2].T)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.documents import Entry
-from derain.scan import Scan
+from derain.scan import Bools, Ints, Scan
 from derain.views.back_projection import BACK_PROJECTIONS, ProjectedPoints
 from derain.views.candidates import Candidates
 from derain.views.channels import channel_image
@@ -45,14 +45,14 @@ class RangeImage(ViewedScan):
     """
 
     image: NDArray[np.float32]
-    valid: NDArray[np.bool_]
-    pixel: NDArray[np.int64]
-    winner: NDArray[np.int64]
+    valid: Bools
+    pixel: Ints
+    winner: Ints
     nearest: NDArray[np.float32]
     range: NDArray[np.float32]
     wraps: bool
     back_projection_name: str
-    candidate: NDArray[np.bool_] | None = None
+    candidate: Bools | None = None
 
     @property
     def size(self) -> int:
@@ -60,12 +60,12 @@ class RangeImage(ViewedScan):
         return self.valid.size
 
     @property
-    def judged(self) -> NDArray[np.bool_]:
+    def judged(self) -> Bools:
         """True for rows of the scan that lie on the grid, bool (N,)."""
         return self.pixel >= 0
 
     @property
-    def hidden(self) -> NDArray[np.bool_]:
+    def hidden(self) -> Bools:
         """True for points on the grid whose pixel shows a nearer return, bool (N,)."""
         return self.judged & (self.range > self.nearest.ravel()[self.pixel])
 
@@ -73,7 +73,7 @@ class RangeImage(ViewedScan):
         """The network's inputs, a batch of one: image (1, C, H, W) and valid (1, 1, H, W)."""
         return {"image": self.image[None], "valid": self.valid[None, None]}
 
-    def target(self, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
+    def target(self, rain: Bools) -> Ints:
         """Training target of each pixel.
 
         Args:
@@ -109,7 +109,7 @@ class RangeImage(ViewedScan):
             "valid": np.stack([one.valid[None] for one in seen]),
         }
 
-    def _shows_candidate(self) -> NDArray[np.bool_]:
+    def _shows_candidate(self) -> Bools:
         """True for pixels that show what may be rain, bool (H · W,)."""
         if self.candidate is None:
             return self.winner >= 0
@@ -120,9 +120,9 @@ class RangeImage(ViewedScan):
 def _to_rows(
     back_projection_name: str,
     points: ProjectedPoints,
-    rows: NDArray[np.int64],
+    rows: Ints,
     count: int,
-    asked: NDArray[np.bool_] | None,
+    asked: Bools | None,
     score: NDArray[np.float32],
 ) -> NDArray[np.float32]:
     """Scores of all rows of a scan, float32 (count,): of some from pixels, of the others 0."""
@@ -215,7 +215,7 @@ class RangeView(View):
             None if self.candidates is None else self.candidates.among(scan),
         )
 
-    def _pixel(self, scan: Scan) -> NDArray[np.int64]:
+    def _pixel(self, scan: Scan) -> Ints:
         """Pixel of each row, int64 (N,); -1 for invalid rows and outside the grid."""
         valid = scan.valid
         if valid.all():
@@ -226,7 +226,7 @@ class RangeView(View):
         return pixel
 
 
-def _shown(pixel: NDArray[np.int64], distance: NDArray[np.float32], size: int) -> NDArray[np.void]:
+def _shown(pixel: Ints, distance: NDArray[np.float32], size: int) -> NDArray[np.void]:
     """The point in each pixel: the nearest one, the lowest row of equally near ones.
 
     Args:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.scan import LARGEST_COORDINATE, Scan
+from derain.scan import LARGEST_COORDINATE, Bools, Ints, Scan
 
 # Returns nearer to each other than this are of one surface, metres: the sensor split its echo.
 # Source: tier4/nebula, `dual_return_distance_threshold`.
@@ -39,9 +39,9 @@ class StatedReturns:
     """
 
     column: str
-    number: NDArray[np.int64]
-    nearer: NDArray[np.bool_]
-    farther: NDArray[np.bool_]
+    number: Ints
+    nearer: Bools
+    farther: Bools
 
 
 def stated_returns(scan: Scan) -> StatedReturns | None:
@@ -96,7 +96,7 @@ def _from_las_bits(scan: Scan, columns: Columns) -> StatedReturns | None:
 
 
 def _from_numbers_and_counts(
-    scan: Scan, name: str, number: NDArray[np.int64], count: NDArray[np.int64]
+    scan: Scan, name: str, number: Ints, count: Ints
 ) -> StatedReturns | None:
     """Returns by numbers from 1, if the number of returns of each ray is known."""
     several = scan.valid & (count > 1) & (number >= 1) & (number <= count)
@@ -145,7 +145,7 @@ def _from_second_ranges(scan: Scan, columns: Columns) -> StatedReturns | None:
     return StatedReturns("range2", np.full(len(scan), -1), nearer, farther)
 
 
-def _from_numbers_alone(scan: Scan, name: str, number: NDArray[np.int64]) -> StatedReturns | None:
+def _from_numbers_alone(scan: Scan, name: str, number: Ints) -> StatedReturns | None:
     """Returns by numbers from 0 or 1, if the number of returns of each ray is not known.
 
     The first return may be the only one of its ray; directions have to decide that.
@@ -157,7 +157,7 @@ def _from_numbers_alone(scan: Scan, name: str, number: NDArray[np.int64]) -> Sta
     return StatedReturns(name, number, np.zeros(len(scan), bool), farther)
 
 
-def _whole(column: NDArray[Any]) -> NDArray[np.int64]:
+def _whole(column: NDArray[Any]) -> Ints:
     """A column as whole numbers; values that are not finite or too large are -1."""
     if column.dtype.kind != "f":
         return column.astype(np.int64)

@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.scan import Scan
+from derain.scan import Bools, Ints, Scan
 from derain.views.directions import shared_direction_pairs
 from derain.views.morton import distinct_rows
 from derain.views.return_columns import LEAST_APART, StatedReturns, stated_returns
@@ -37,9 +37,9 @@ class RayReturns:
             is known to have two returns.
     """
 
-    nearer: NDArray[np.bool_]
-    farther: NDArray[np.bool_]
-    partner: NDArray[np.int64]
+    nearer: Bools
+    farther: Bools
+    partner: Ints
     found_by: str
 
     @property
@@ -98,9 +98,7 @@ def _pair(scan: Scan) -> RayReturns:
     return _returns_of_rows(found, first, inverse, stated)
 
 
-def _returns_of_points(
-    near: NDArray[np.int64], far: NDArray[np.int64], ranges: NDArray[np.float32]
-) -> RayReturns:
+def _returns_of_points(near: Ints, far: Ints, ranges: NDArray[np.float32]) -> RayReturns:
     """The return number of points, from their pairs.
 
     Args:
@@ -120,10 +118,7 @@ def _returns_of_points(
 
 
 def _returns_of_rows(
-    found: RayReturns,
-    first: NDArray[np.int64],
-    inverse: NDArray[np.int64],
-    stated: StatedReturns | None,
+    found: RayReturns, first: Ints, inverse: Ints, stated: StatedReturns | None
 ) -> RayReturns:
     """The return number of rows, from that of distinct positions and the stated returns.
 

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from derain.scan import FEWEST_ALIKE, PartialHeader, Scan
+from derain.scan import FEWEST_ALIKE, Bools, PartialHeader, Scan
 from derain.views.full_scale import FULL_SCALES
 
 # Intensities this many times off the training data's are of another unit.
@@ -130,7 +129,7 @@ def intensity_of_another_scale(scan: Scan, expected: float, whose: str) -> Itera
         )
 
 
-def outside_view(scan: Scan, judged: NDArray[np.bool_], data: str) -> Iterator[ScanIssue]:
+def outside_view(scan: Scan, judged: Bools, data: str) -> Iterator[ScanIssue]:
     """Yields an issue if much of a scan lies outside the field of view of a model.
 
     The caller passes the judged rows: to project the scan again would take as long as the view. A
@@ -165,7 +164,7 @@ def much_removed(share: float) -> Iterator[ScanIssue]:
         )
 
 
-def intensity_in_places(scan: Scan, judged: NDArray[np.bool_]) -> Iterator[ScanIssue]:
+def intensity_in_places(scan: Scan, judged: Bools) -> Iterator[ScanIssue]:
     """Yields an issue if some points of a scan have no possible intensity, and others have.
 
     Args:

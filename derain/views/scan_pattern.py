@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from derain.scan import Scan
+from derain.scan import Floats, Ints, Scan
 from derain.views.directions import directions
 from derain.views.spherical_grid import ALL_AROUND, FULL_CIRCLE
 
@@ -48,9 +47,9 @@ class ReturnAngles:
         row: Its row in an organised scan, int64 (N,); None in any other scan.
     """
 
-    azimuth: NDArray[np.float64]
-    inclination: NDArray[np.float64]
-    row: NDArray[np.int64] | None
+    azimuth: Floats
+    inclination: Floats
+    row: Ints | None
 
     @classmethod
     def of(cls, scan: Scan) -> Self:
@@ -60,7 +59,7 @@ class ReturnAngles:
         return cls(azimuth, inclination, valid // scan.shape[1] if scan.shape else None)
 
 
-def azimuth_extent(azimuth: NDArray[np.float64]) -> Extent:
+def azimuth_extent(azimuth: Floats) -> Extent:
     """Right and left end of what the sensor sees, degrees.
 
     Args:
@@ -81,7 +80,7 @@ def azimuth_extent(azimuth: NDArray[np.float64]) -> Extent:
     return right + float(inside.min()), right + float(inside.max())
 
 
-def inclination_extent(inclination: NDArray[np.float64]) -> Extent:
+def inclination_extent(inclination: Floats) -> Extent:
     """Lower and upper end of what the sensor sees, outliers left out, degrees.
 
     Args:
@@ -93,7 +92,7 @@ def inclination_extent(inclination: NDArray[np.float64]) -> Extent:
     return float(inside.min()), float(inside.max())
 
 
-def find_beams(scans: Sequence[ReturnAngles]) -> NDArray[np.float64]:
+def find_beams(scans: Sequence[ReturnAngles]) -> Floats:
     """Inclinations of the sensor's beams, if they can be found.
 
     Args:
@@ -139,7 +138,7 @@ def inclination_step(scans: Sequence[ReturnAngles], azimuth_step: float) -> floa
     )
 
 
-def _median_gap(scans: Sequence[tuple[NDArray[np.float64], NDArray[np.int64]]]) -> float:
+def _median_gap(scans: Sequence[tuple[Floats, Ints]]) -> float:
     """Median gap between the angles that lie in one slab, of angles and slab numbers by scan."""
     # Slabs are laid end to end, farther apart than any two angles.
     lines = [np.sort(slab * (2 * FULL_CIRCLE) + angle) for angle, slab in scans]
@@ -148,7 +147,7 @@ def _median_gap(scans: Sequence[tuple[NDArray[np.float64], NDArray[np.int64]]]) 
     return float(np.median(gaps)) if len(gaps) else USUAL_STEP
 
 
-def _beams_of_rows(inclination: NDArray[np.float64], row: NDArray[np.int64]) -> NDArray[np.float64]:
+def _beams_of_rows(inclination: Floats, row: Ints) -> Floats:
     """Beams of an organised scan, a row each: ascending, float64 (beams,), degrees, or none."""
     by_row = np.lexsort((inclination, row))
     rows, starts, counts = np.unique(row[by_row], return_index=True, return_counts=True)
@@ -160,7 +159,7 @@ def _beams_of_rows(inclination: NDArray[np.float64], row: NDArray[np.int64]) -> 
     return beams if separate else np.zeros(0)
 
 
-def _beams_of_clusters(ascending: NDArray[np.float64]) -> NDArray[np.float64]:
+def _beams_of_clusters(ascending: Floats) -> Floats:
     """Beams whose returns share one inclination: ascending, float64 (beams,), degrees, or none."""
     starts = np.flatnonzero(np.diff(ascending, prepend=-np.inf) > FINEST_STEP)
     ends = np.append(starts[1:], len(ascending))
@@ -177,13 +176,13 @@ def _beams_of_clusters(ascending: NDArray[np.float64]) -> NDArray[np.float64]:
     return ascending[(starts + ends) // 2][is_beam] if separate else np.zeros(0)
 
 
-def _well_seen(degree: NDArray[np.int64]) -> NDArray[np.int64]:
+def _well_seen(degree: Ints) -> Ints:
     """Whole degrees that hold more than outliers, ascending."""
     counts = np.bincount(degree)
     return np.flatnonzero(counts >= max(1.0, SPARSE * _typical(counts)))
 
 
-def _typical(sizes: NDArray[np.int64]) -> float:
+def _typical(sizes: Ints) -> float:
     """Size of the group that a typical member belongs to: groups weigh as much as they hold."""
     ascending = np.sort(sizes)
     held = np.cumsum(ascending)

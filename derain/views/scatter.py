@@ -3,15 +3,14 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
+
+from derain.scan import Floats, Ints
 
 # Below any trace of a covariance that distinct positions can have.
 _NOTHING = 1e-300
 
 
-def scatter_through_space(
-    xyz: NDArray[np.float64], neighbours: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def scatter_through_space(xyz: Floats, neighbours: Ints) -> Floats:
     """Smallest eigenvalue of each neighbourhood's covariance over the sum of all three.
 
     Args:
@@ -40,7 +39,7 @@ def scatter_through_space(
     return np.where(trace > _NOTHING, np.maximum(smallest, 0), 0)
 
 
-def _about_their_mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _about_their_mean(values: Floats) -> Floats:
     """The values of each column less their mean, float64 (k, Q)."""
-    about: NDArray[np.float64] = values - values.mean(axis=0)
+    about: Floats = values - values.mean(axis=0)
     return about

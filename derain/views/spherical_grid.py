@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.documents import Entry, shown
+from derain.scan import Floats, Ints
 from derain.views.direction_table import OUTSIDE, UNSURE_BELOW, DirectionTable
 from derain.views.directions import directions
 
@@ -141,7 +142,7 @@ class SphericalGrid:
         right, left = self.azimuth
         return left - right == FULL_CIRCLE
 
-    def pixel(self, xyz: NDArray[np.float32]) -> NDArray[np.int64]:
+    def pixel(self, xyz: NDArray[np.float32]) -> Ints:
         """The pixel that each point falls into.
 
         On an even grid this is the published projection, except that it clamps points beyond the
@@ -165,7 +166,7 @@ class SphericalGrid:
         pixel[unsure] = self._first_pixel(inclination) + self._column(azimuth)
         return np.maximum(pixel, -1, out=pixel)
 
-    def _first_pixel(self, inclination: NDArray[np.float64]) -> NDArray[np.int64]:
+    def _first_pixel(self, inclination: Floats) -> Ints:
         """First pixel of the row, int64 (N,); OUTSIDE where it is none of the grid's."""
         ascending = np.array(self.edges[::-1])
         # Rows are counted from the top, and the lowest edge belongs to the last of them.
@@ -174,7 +175,7 @@ class SphericalGrid:
         inside = (inclination >= ascending[0]) & (inclination <= ascending[-1])
         return np.where(inside, row * self.columns, OUTSIDE)
 
-    def _column(self, azimuth: NDArray[np.float64]) -> NDArray[np.int64]:
+    def _column(self, azimuth: Floats) -> Ints:
         """Column, int64 (N,); OUTSIDE where it is none of the grid's."""
         right, left = self.azimuth
         from_left = (left - azimuth) % FULL_CIRCLE

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.documents import Entry
-from derain.scan import Scan
+from derain.scan import Bools, Ints, Scan
 from derain.system.registry import Registry
 from derain.views.candidates import Candidates
 from derain.views.spherical_grid import ALL_AROUND
@@ -41,7 +41,7 @@ class ViewedScan(ABC):
 
     @property
     @abstractmethod
-    def judged(self) -> NDArray[np.bool_]:
+    def judged(self) -> Bools:
         """True for rows of the scan that are given the score of some cell, bool (N,)."""
 
     @abstractmethod
@@ -49,7 +49,7 @@ class ViewedScan(ABC):
         """The network's inputs by name, in its order."""
 
     @abstractmethod
-    def target(self, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
+    def target(self, rain: Bools) -> Ints:
         """Training target of each cell.
 
         Args:

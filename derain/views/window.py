@@ -4,10 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.scan import Scan
+from derain.scan import Floats, Scan
 
 
 @dataclass(frozen=True)
@@ -51,10 +50,10 @@ class PlacedScan:
 
     scan: Scan
     time: float | None = None
-    pose: NDArray[np.float64] | None = None
+    pose: Floats | None = None
     stretch: int = 0
 
-    def to(self, other: "PlacedScan") -> NDArray[np.float64] | None:
+    def to(self, other: "PlacedScan") -> Floats | None:
         """Takes the frame of this scan to that of another, float64 (4, 4); None if not known."""
         if self.pose is None or other.pose is None or self.stretch != other.stretch:
             return None
