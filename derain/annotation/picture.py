@@ -5,13 +5,13 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba_array
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Polygon
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from derain.annotation.scene import Scene
 from derain.annotation.steps import CLASS_NAMES
 from derain.fusion import UNKNOWN
 from derain.pictures.scan_pictures import legend_below, scatter, titled_figure
-from derain.scan import Scan
+from derain.scan import Ints, Scan
 from derain.simulation.classes import TrackClass
 from derain.views.directions import directions
 
@@ -32,7 +32,7 @@ CLASS_COLOURS = {
 SURROUNDINGS = 3.0
 
 
-def annotation_figure(scan: Scan, label: NDArray[np.int64], scene: Scene, title: str) -> Figure:
+def annotation_figure(scan: Scan, label: Ints, scene: Scene, title: str) -> Figure:
     """One scan coloured by class, from above with road and boxes, and as the sensor sees it.
 
     Args:
@@ -55,7 +55,7 @@ def annotation_figure(scan: Scan, label: NDArray[np.int64], scene: Scene, title:
     return figure
 
 
-def _legend(label: NDArray[np.int64]) -> list[Patch]:
+def _legend(label: Ints) -> list[Patch]:
     counts = np.bincount(label, minlength=UNKNOWN + 1)
     return [
         Patch(color=colour, label=f"{CLASS_NAMES[kind]} {counts[kind]:,}")

@@ -18,10 +18,10 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.path import Path as Outline
-from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.documents import Entry
+from derain.scan import Bools, Floats
 from derain.simulation.classes import TrackClass
 
 Triple = tuple[float, float, float]
@@ -48,7 +48,7 @@ class Rectangle:
     size: tuple[float, float]
     heading: float
 
-    def relative(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def relative(self, points: Floats) -> Floats:
         """Positions of points in the rectangle's frame: ahead and left of its centre.
 
         Args:
@@ -61,21 +61,21 @@ class Rectangle:
         (cosine, _), (sine, _) = self._axes
         return np.stack([cosine * x + sine * y, cosine * y - sine * x], axis=-1)
 
-    def contains(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def contains(self, points: Floats) -> Bools:
         """True for points, float64 (N, 2), metres, inside or on the outline; bool (N,)."""
         ahead, left = self.relative(points).T
         length, width = self.size
-        inside: NDArray[np.bool_] = (np.abs(ahead) <= length / 2) & (np.abs(left) <= width / 2)
+        inside: Bools = (np.abs(ahead) <= length / 2) & (np.abs(left) <= width / 2)
         return inside
 
-    def corners(self) -> NDArray[np.float64]:
+    def corners(self) -> Floats:
         """Its corners x, y in order, float64 (4, 2), metres."""
         halves = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) / 2
-        corners: NDArray[np.float64] = (halves * self.size) @ self._axes.T + self.centre
+        corners: Floats = (halves * self.size) @ self._axes.T + self.centre
         return corners
 
     @property
-    def _axes(self) -> NDArray[np.float64]:
+    def _axes(self) -> Floats:
         """Directions ahead and left as columns, (2, 2)."""
         cosine, sine = np.cos(np.radians(self.heading)), np.sin(np.radians(self.heading))
         return np.array([[cosine, -sine], [sine, cosine]])
@@ -117,7 +117,7 @@ class Box:
         """Its outline seen from above."""
         return Rectangle(self.centre[:2], self.size[:2], self.heading)
 
-    def contains(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def contains(self, points: Floats) -> Bools:
         """True for points that lie in the box or on its faces.
 
         Args:
@@ -173,7 +173,7 @@ class Scene:
         return replace(self, boxes=boxes, corrections={})
 
 
-def inside(polygon: Polygon, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+def inside(polygon: Polygon, points: Floats) -> Bools:
     """True for points that lie in a polygon, seen from above.
 
     Args:
@@ -183,7 +183,7 @@ def inside(polygon: Polygon, points: NDArray[np.float64]) -> NDArray[np.bool_]:
     Returns:
         bool (N,).
     """
-    within: NDArray[np.bool_] = Outline(polygon).contains_points(points[:, :2])
+    within: Bools = Outline(polygon).contains_points(points[:, :2])
     return within
 
 

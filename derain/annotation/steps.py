@@ -21,12 +21,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.annotation.scene import Scene, inside
 from derain.errors import InputError
 from derain.fusion import UNKNOWN
-from derain.scan import Scan
+from derain.scan import Floats, Ints, Scan
 from derain.simulation.classes import TrackClass
 from derain.system.open3d_import import import_open3d
 
@@ -70,7 +69,7 @@ class Plane:
     normal: tuple[float, float, float]
     offset: float
 
-    def height(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def height(self, points: Floats) -> Floats:
         """Signed distance from the plane, positive above it.
 
         Args:
@@ -79,7 +78,7 @@ class Plane:
         Returns:
             float64 (N,), metres.
         """
-        height: NDArray[np.float64] = points @ np.array(self.normal) + self.offset
+        height: Floats = points @ np.array(self.normal) + self.offset
         return height
 
     @property
@@ -119,7 +118,7 @@ def road_plane(scans: Sequence[Scan], scene: Scene) -> Plane:
     return plane
 
 
-def _ransac(points: NDArray[np.float64]) -> Plane:
+def _ransac(points: Floats) -> Plane:
     """The plane that holds the most points, float64 (N, 3), metres."""
     open3d = import_open3d()
     open3d.utility.random.seed(0)
@@ -131,7 +130,7 @@ def _ransac(points: NDArray[np.float64]) -> Plane:
     return Plane((float(a), float(b), float(c)), float(d))
 
 
-def annotate(scan: Scan, scene: Scene, plane: Plane) -> NDArray[np.int64]:
+def annotate(scan: Scan, scene: Scene, plane: Plane) -> Ints:
     """Labels the points of a scan.
 
     Where boxes overlap, a sprinkler's box counts, otherwise the first in the scene.
@@ -162,15 +161,15 @@ def annotate(scan: Scan, scene: Scene, plane: Plane) -> NDArray[np.int64]:
     return label
 
 
-def _bare_road(scan: Scan, scene: Scene) -> NDArray[np.float64]:
+def _bare_road(scan: Scan, scene: Scene) -> Floats:
     """Points over the road and in no box, float64 (M, 3), metres."""
     points = scan.xyz[scan.valid].astype(np.float64)
     points = points[inside(scene.road, points)]
-    bare: NDArray[np.float64] = points[_boxed(points, scene) == NO_BOX]
+    bare: Floats = points[_boxed(points, scene) == NO_BOX]
     return bare
 
 
-def _boxed(points: NDArray[np.float64], scene: Scene) -> NDArray[np.int64]:
+def _boxed(points: Floats, scene: Scene) -> Ints:
     """Class of the box that each point is in, int64 (N,); NO_BOX where it is in none."""
     # Sorted by x, so that a box is compared only with the points in its span of x.
     order = np.argsort(points[:, 0])

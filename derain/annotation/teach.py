@@ -31,6 +31,7 @@ from derain.files.atomic import replacing, temporary_folder, write_text, writing
 from derain.files.labels import LABEL, write_labels
 from derain.jobs.job import FOLDER
 from derain.jobs.running import IsThere, Submits, Task, completed, run
+from derain.scan import Ints
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
@@ -72,7 +73,7 @@ class LabelledScan:
     frame: Frame
     answers: Answers = field(default_factory=Answers)
     milliseconds: Mapping[str, float] = field(default_factory=dict)
-    truth: Sequence[NDArray[np.int64]] | None = None
+    truth: Sequence[Ints] | None = None
     issues: Sequence[ScanIssue] = ()
     error: InputError | None = None
 
@@ -355,7 +356,7 @@ def labels_of(judgement: Judgement) -> NDArray[np.uint32]:
     return labels
 
 
-def _measured(card: DataCard, frame: Frame, judgement: Judgement) -> list[NDArray[np.int64]]:
+def _measured(card: DataCard, frame: Frame, judgement: Judgement) -> list[Ints]:
     """Counts the answers to a scan by its own labels, first of all points, then of sure ones."""
     record = TruthRecord(card)
     of_all = judgement.rain, np.ones_like(judgement.rain)

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.scan import Bools, Floats, Ints
 from derain.views.morton import evenly
 from derain.views.scatter import scatter_through_space
 
 # Neighbourhoods of some points, given by their rows: rows of points int64 (Q, k), the point itself
 # first, and distances in metres, float32 (Q, k).
-Around = Callable[[NDArray[np.int64]], tuple[NDArray[np.int64], NDArray[np.float32]]]
+Around = Callable[[Ints], tuple[Ints, NDArray[np.float32]]]
 
 # Points whose neighbourhoods are looked at.
 SAMPLE = 4096
@@ -51,9 +52,7 @@ class RainBounds:
     is_bright: bool
     range: float
 
-    def hold(
-        self, intensity: NDArray[np.float32], distance: NDArray[np.floating[Any]]
-    ) -> NDArray[np.bool_]:
+    def hold(self, intensity: NDArray[np.float32], distance: NDArray[np.floating[Any]]) -> Bools:
         """True for points within the bounds, bool (M,).
 
         Args:
@@ -67,10 +66,10 @@ class RainBounds:
 
 
 def fit_rain_bounds(
-    xyz: NDArray[np.float64],
-    distance: NDArray[np.float64],
+    xyz: Floats,
+    distance: Floats,
     intensity: NDArray[np.float32],
-    may_be: NDArray[np.bool_],
+    may_be: Bools,
     around: Around,
     sparseness: float,
     reach: float,
@@ -113,21 +112,21 @@ def fit_rain_bounds(
 
 
 def _is_airborne(
-    xyz: NDArray[np.float64],
-    distance: NDArray[np.float64],
-    neighbourhoods: tuple[NDArray[np.int64], NDArray[np.float32]],
+    xyz: Floats,
+    distance: Floats,
+    neighbourhoods: tuple[Ints, NDArray[np.float32]],
     sparseness: float,
-) -> NDArray[np.bool_]:
+) -> Bools:
     """True for neighbourhoods that are scattered through space and sparse, bool (Q,)."""
     neighbours, distances = neighbourhoods
     spacing = distances.T.astype(np.float64).mean(axis=0) / distance
     sparse = spacing > sparseness * np.median(spacing)
-    airborne: NDArray[np.bool_] = sparse & (scatter_through_space(xyz, neighbours) > OFF_SURFACES)
+    airborne: Bools = sparse & (scatter_through_space(xyz, neighbours) > OFF_SURFACES)
     return airborne
 
 
 def _greatest_difference(
-    intensity: NDArray[np.float32], airborne: NDArray[np.bool_]
+    intensity: NDArray[np.float32], airborne: Bools
 ) -> tuple[float, bool, float]:
     """The bound that separates best what is in the air.
 

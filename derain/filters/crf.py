@@ -13,7 +13,7 @@ from derain.filters.airborne import Around, fit_rain_bounds
 from derain.filters.ground import find_ground
 from derain.filters.point_filter import FILTERS, PointFilter, RainAndPoints, Span, filter_view
 from derain.filters.random_field import decide_sequentially
-from derain.scan import Scan
+from derain.scan import Bools, Floats, Ints, Scan
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
 from derain.views.channels import filled_values
@@ -123,7 +123,7 @@ class CRF(PointFilter):
                 f"Give {FEWEST_NEIGHBOURS} or more.",
             )
 
-    def judge(self, view: Neighbourhoods) -> NDArray[np.bool_]:
+    def judge(self, view: Neighbourhoods) -> Bools:
         """Returns which points are rain; see :class:`PointFilter`."""
         size = min(self.neighbours, view.size)  # where there are fewer, the rest are stand-ins
         neighbours, distances = view.neighbours[:, :size], view.distances[:, :size]
@@ -152,7 +152,7 @@ class CRF(PointFilter):
         if self.variant == "published":
             yield from intensity_of_another_scale(scan, self.FULL_SCALE, self.name)
 
-    def _rain(self, points: NDArray[np.float32], around: Around) -> NDArray[np.bool_]:
+    def _rain(self, points: NDArray[np.float32], around: Around) -> Bools:
         """True for points that are rain, bool (M,).
 
         Args:
@@ -175,12 +175,8 @@ class CRF(PointFilter):
         return decide_sequentially(feature, rows, place, neighbours, distances, self.vote)
 
     def _is_candidate(
-        self,
-        xyz: NDArray[np.float64],
-        intensity: NDArray[np.float32],
-        distance: NDArray[np.float64],
-        around: Around,
-    ) -> NDArray[np.bool_]:
+        self, xyz: Floats, intensity: NDArray[np.float32], distance: Floats, around: Around
+    ) -> Bools:
         """True for points that may be rain, bool (M,)."""
         if self.variant == "published":
             is_near = (distance <= self.range) & (xyz[:, 2] >= -self.sensor_height)
@@ -194,12 +190,7 @@ class CRF(PointFilter):
             return np.zeros(len(xyz), bool)
         return above & bounds.hold(intensity, distance)
 
-    def _feature(
-        self,
-        scatter: NDArray[np.float64],
-        spacing: NDArray[np.float64],
-        intensity: NDArray[np.float64],
-    ) -> NDArray[np.float64]:
+    def _feature(self, scatter: Floats, spacing: Floats, intensity: Floats) -> Floats:
         """F of each candidate, scaled to -1..1, float64 (Q,)."""
         if self.variant == "fitted":
             feature = (1 + scatter) * (5 + np.minimum(spacing, 1))
@@ -209,11 +200,11 @@ class CRF(PointFilter):
             least, largest = float(feature.min()), float(feature.max())
         if largest == least:  # nothing stands out
             return np.full(len(feature), -1.0)
-        scaled: NDArray[np.float64] = 2 * (feature - least) / (largest - least) - 1
+        scaled: Floats = 2 * (feature - least) / (largest - least) - 1
         return scaled
 
 
-def _along_the_sweep(xyz: NDArray[np.float64]) -> NDArray[np.int64]:
+def _along_the_sweep(xyz: Floats) -> Ints:
     """Place of each point in the order of azimuth; along the curve where that is equal.
 
     Args:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.filters.point_filter import PointFilter, rows_of
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
@@ -55,9 +55,7 @@ class FilterDerainer(Method):
         self.threads = threads_of(threads)
         self.candidates = candidates
 
-    def __call__(
-        self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None
-    ) -> NDArray[np.bool_]:
+    def __call__(self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None) -> Bools:
         """Returns which points are rain.
 
         Args:

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.filters.point_filter import FILTERS, TUNED_NEIGHBOURS, PointFilter, Span
+from derain.scan import Bools, Floats
 from derain.views.neighbours import Neighbourhoods
 
 
@@ -49,7 +49,7 @@ class SOR(PointFilter):
     neighbours: int = 5
     deviation_multiplier: float = 0.01
 
-    def judge(self, view: Neighbourhoods) -> NDArray[np.bool_]:
+    def judge(self, view: Neighbourhoods) -> Bools:
         """Returns which points are rain; see :class:`PointFilter`."""
         if view.size < 2:
             return np.zeros(view.size, bool)
@@ -94,20 +94,18 @@ class DSOR(PointFilter):
     deviation_multiplier: float = 0.01
     range_multiplier: float = 0.05
 
-    def judge(self, view: Neighbourhoods) -> NDArray[np.bool_]:
+    def judge(self, view: Neighbourhoods) -> Bools:
         """Returns which points are rain; see :class:`PointFilter`."""
         if view.size < 2:
             return np.zeros(view.size, bool)
         distance = mean_distance(view, self.neighbours)
         x, y, z = view.points[:, :3].T.astype(np.float64)
         reach = self.range_multiplier * np.sqrt(x * x + y * y + z * z)
-        rain: NDArray[np.bool_] = (
-            distance >= usual_limit(distance, self.deviation_multiplier) * reach
-        )
+        rain: Bools = distance >= usual_limit(distance, self.deviation_multiplier) * reach
         return rain
 
 
-def mean_distance(view: Neighbourhoods, neighbours: int) -> NDArray[np.float64]:
+def mean_distance(view: Neighbourhoods, neighbours: int) -> Floats:
     """Mean distance of every point to the others of its neighbourhood.
 
     Args:
@@ -126,6 +124,6 @@ def mean_distance(view: Neighbourhoods, neighbours: int) -> NDArray[np.float64]:
     return total / others
 
 
-def usual_limit(distance: NDArray[np.float64], deviations: float) -> float:
+def usual_limit(distance: Floats, deviations: float) -> float:
     """Mean of two distances or more, plus a number of their standard deviations (of n - 1)."""
     return float(distance.mean() + deviations * distance.std(ddof=1))

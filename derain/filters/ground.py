@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.scan import Bools, Floats
 from derain.views.morton import evenly
 
 # Distances between which the road is sought, metres: nearer lies the vehicle, farther off the road
@@ -60,16 +61,14 @@ class Ground:
     slope_y: float
     offset: float
 
-    def is_above(self, xyz: NDArray[np.floating[Any]]) -> NDArray[np.bool_]:
+    def is_above(self, xyz: NDArray[np.floating[Any]]) -> Bools:
         """True for points above the ground, bool (M,).
 
         Args:
             xyz: Coordinates, (M, 3), metres, sensor frame.
         """
         x, y, z = np.array(xyz.T, np.float64, order="C")
-        is_above: NDArray[np.bool_] = (
-            z - (self.slope_x * x + self.slope_y * y + self.offset) > IN_PLANE
-        )
+        is_above: Bools = z - (self.slope_x * x + self.slope_y * y + self.offset) > IN_PLANE
         return is_above
 
 
@@ -107,7 +106,7 @@ def find_ground(xyz: NDArray[np.floating[Any]]) -> Ground | None:
     return Ground(slope_x, slope_y, offset)
 
 
-def _low_points(xyz: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+def _low_points(xyz: NDArray[np.floating[Any]]) -> Floats:
     """A low point of each square around the sensor, float64 (S, 3)."""
     x, y, z = xyz.T
     squared = x * x + y * y
@@ -120,9 +119,7 @@ def _low_points(xyz: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
     return points[order[start + (BELOW_IT * count).astype(np.int64)]]
 
 
-def _roughly(
-    x: NDArray[np.float64], y: NDArray[np.float64], z: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _roughly(x: Floats, y: Floats, z: Floats) -> Floats:
     """Both slopes and the height, by steps, of the plane that holds most points, float64 (3,)."""
     slopes = np.tan(np.radians(np.arange(-STEEPEST_ROAD, STEEPEST_ROAD + 1, STEP_OF_SLOPE)))
     ahead, left = (slope.ravel() for slope in np.meshgrid(slopes, slopes))

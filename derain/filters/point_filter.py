@@ -9,11 +9,10 @@ from types import MappingProxyType
 from typing import Any, ClassVar, Literal, get_args, get_origin
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.errors import InputError, did_you_mean
 from derain.files.documents import short, shown
-from derain.scan import Scan
+from derain.scan import Bools, Ints, Scan
 from derain.system.registry import Registry, from_parameters
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
@@ -35,7 +34,7 @@ Span = tuple[int, int] | tuple[float, float]
 
 # Which of M points are rain, bool (M,), and the point of each row of a scan, int64 (N,); -1 for
 # rows that cannot be judged.
-RainAndPoints = tuple[NDArray[np.bool_], NDArray[np.int64]]
+RainAndPoints = tuple[Bools, Ints]
 
 # Where derain's own filters look for the best number of neighbours. Tuning finds as many of every
 # point as the largest asks for, and keeps them in memory for all trials.
@@ -92,7 +91,7 @@ class PointFilter(ABC):
         return FILTERS.name_of(type(self)) or type(self).__name__.lower()
 
     @abstractmethod
-    def judge(self, view: Neighbourhoods) -> NDArray[np.bool_]:
+    def judge(self, view: Neighbourhoods) -> Bools:
         """Returns which points are rain.
 
         Args:
@@ -172,7 +171,7 @@ def filter_view(neighbours: int, threads: int = 0) -> NeighbourView:
 
 def rain_among(
     filter: PointFilter, view: Neighbourhoods, scan: Scan, candidates: Candidates | None
-) -> NDArray[np.bool_]:
+) -> Bools:
     """The points that a filter calls rain among candidates.
 
     A filter looks at all points to find what is usual, whether or not they are candidates. So its
@@ -191,7 +190,7 @@ def rain_among(
     return rain if candidates is None else rain & candidates.among(scan)[view.first]
 
 
-def rows_of(points: NDArray[np.bool_], inverse: NDArray[np.int64]) -> NDArray[np.bool_]:
+def rows_of(points: Bools, inverse: Ints) -> Bools:
     """Gives every row of a scan the verdict on its point.
 
     Args:

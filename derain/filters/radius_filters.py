@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.filters.point_filter import FILTERS, TUNED_NEIGHBOURS, PointFilter, RainAndPoints, Span
-from derain.scan import Scan
+from derain.scan import Bools, Floats, Ints, Scan
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
 from derain.views.morton import distinct_rows
@@ -38,7 +38,7 @@ class RadiusFilter(PointFilter):
     """
 
     @abstractmethod
-    def radius_at(self, points: NDArray[np.float32]) -> NDArray[np.float64]:
+    def radius_at(self, points: NDArray[np.float32]) -> Floats:
         """The radius around each point.
 
         Args:
@@ -48,7 +48,7 @@ class RadiusFilter(PointFilter):
             Metres, float64 (M,).
         """
 
-    def judge(self, view: Neighbourhoods) -> NDArray[np.bool_]:
+    def judge(self, view: Neighbourhoods) -> Bools:
         """Returns which points are rain; see :class:`PointFilter`.
 
         No radius is searched: at least k points lie within it exactly where the k-th nearest is
@@ -104,7 +104,7 @@ class ROR(RadiusFilter):
     neighbours: int = 4
     radius: float = 0.08
 
-    def radius_at(self, points: NDArray[np.float32]) -> NDArray[np.float64]:
+    def radius_at(self, points: NDArray[np.float32]) -> Floats:
         """The radius around each point; see :class:`RadiusFilter`."""
         return np.full(len(points), self.radius, np.float64)
 
@@ -160,22 +160,18 @@ class DROR(RadiusFilter):
     minimum_radius: float = 0.04
     variant: Literal["code", "paper"] = "code"
 
-    def radius_at(self, points: NDArray[np.float32]) -> NDArray[np.float64]:
+    def radius_at(self, points: NDArray[np.float32]) -> Floats:
         """The radius around each point; see :class:`RadiusFilter`."""
         x, y = points[:, :2].T.astype(np.float64)
         angle = math.radians(self.azimuth_resolution)
         spacing = 2 * math.sin(angle) if self.variant == "code" else angle
-        radius: NDArray[np.float64] = self.radius_multiplier * spacing * np.sqrt(x * x + y * y)
+        radius: Floats = self.radius_multiplier * spacing * np.sqrt(x * x + y * y)
         return np.maximum(radius, self.minimum_radius)
 
 
 def has_few_neighbours(
-    xyz: NDArray[np.float32],
-    radius: NDArray[np.float64],
-    count: int,
-    threads: int,
-    queried: NDArray[np.bool_] | None = None,
-) -> NDArray[np.bool_]:
+    xyz: NDArray[np.float32], radius: Floats, count: int, threads: int, queried: Bools | None = None
+) -> Bools:
     """Finds the points that have fewer than ``count`` points within their radius.
 
     Args:
@@ -205,9 +201,7 @@ def has_few_neighbours(
     return few
 
 
-def _found_along_curve(
-    places: NDArray[np.float64], radius: NDArray[np.float64]
-) -> NDArray[np.int64]:
+def _found_along_curve(places: Floats, radius: Floats) -> Ints:
     """Counts points within the radius: the point itself and CURVE_STEPS places to either side.
 
     Args:

@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.scan import Bools, Floats, Ints
+
 # Features from -1 to 1 above the first are rain, and those up to the second are not, whatever the
 # neighbours are.
 # Source: CRFOR.
@@ -14,13 +16,13 @@ DISTANCE_FLOOR = 0.01
 
 
 def decide_sequentially(
-    feature: NDArray[np.float64],
-    rows: NDArray[np.int64],
-    place: NDArray[np.int64],
-    neighbours: NDArray[np.int64],
+    feature: Floats,
+    rows: Ints,
+    place: Ints,
+    neighbours: Ints,
     distances: NDArray[np.float32],
     vote: float,
-) -> NDArray[np.bool_]:
+) -> Bools:
     """Judges points one after the other, each by its feature and by its neighbours.
 
     A point of an uncertain feature F is rain where F + Σ v / (0.01 m + d) > 0, over its neighbours
@@ -64,11 +66,11 @@ def decide_sequentially(
 
 
 def _turn_in_waves(
-    is_rain: NDArray[np.bool_],
-    open_: NDArray[np.int64],
-    own: NDArray[np.float64],
-    votes: NDArray[np.float64],
-    at_least: NDArray[np.float64],
+    is_rain: Bools,
+    open_: Ints,
+    own: Floats,
+    votes: Floats,
+    at_least: Floats,
     dependents: "_Dependents",
 ) -> None:
     """Turns points from rain to not rain, until none turns any more.
@@ -91,14 +93,14 @@ def _turn_in_waves(
         is_rain[turned] = False
 
 
-def _by_point(points: int, rows: NDArray[np.int64], values: NDArray[np.int64]) -> NDArray[np.int64]:
+def _by_point(points: int, rows: Ints, values: Ints) -> Ints:
     """Values of some points by their rows, and what is beyond them all for others, int64 (M,)."""
     by_point = np.full(points, np.iinfo(np.int64).max)
     by_point[rows] = values
     return by_point
 
 
-def _total(own: NDArray[np.float64], votes: NDArray[np.float64]) -> NDArray[np.float64]:
+def _total(own: Floats, votes: Floats) -> Floats:
     """The features of points and the votes for each, from the nearest neighbour on.
 
     Sums that are rounded in one order keep the order of their terms: where votes are less, the
@@ -123,9 +125,7 @@ class _Dependents:
         uncertain: U.
     """
 
-    def __init__(
-        self, neighbours: NDArray[np.int64], is_earlier: NDArray[np.bool_], uncertain: int
-    ) -> None:
+    def __init__(self, neighbours: Ints, is_earlier: Bools, uncertain: int) -> None:
         of = neighbours[is_earlier]
         order = np.argsort(of, kind="stable")
         self._column, self._dependent = (place[order] for place in np.nonzero(is_earlier))
@@ -133,7 +133,7 @@ class _Dependents:
         self._end = np.cumsum(count)
         self._start = self._end - count
 
-    def of(self, points: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def of(self, points: Ints) -> tuple[Ints, Ints]:
         """Who hears of the decisions on some points, and as which of its neighbours.
 
         Args:

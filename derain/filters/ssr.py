@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.filters.point_filter import FILTERS, TUNED_NEIGHBOURS, PointFilter, Span
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.views.neighbours import Neighbourhoods
 from derain.views.scan_issues import ScanIssue, intensity_of_another_scale, missing_intensity
 
@@ -49,7 +48,7 @@ class SSR(PointFilter):
     neighbours: int = 9
     threshold: float = 2.5
 
-    def judge(self, view: Neighbourhoods) -> NDArray[np.bool_]:
+    def judge(self, view: Neighbourhoods) -> Bools:
         """Returns which points are rain; see :class:`PointFilter`.
 
         Args:

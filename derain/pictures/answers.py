@@ -7,7 +7,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
-from numpy.typing import NDArray
 
 from derain.cards.card import DataCard
 from derain.evaluation.answers import (
@@ -22,7 +21,7 @@ from derain.evaluation.answers import (
     coarse_bands,
     total,
 )
-from derain.evaluation.counts import Mask, ratio
+from derain.evaluation.counts import ratio
 from derain.pictures.palette import OUTCOMES
 from derain.pictures.scan_pictures import (
     draw_from_above,
@@ -30,7 +29,7 @@ from derain.pictures.scan_pictures import (
     legend_below,
     titled_figure,
 )
-from derain.scan import Scan
+from derain.scan import Bools, Ints, Scan
 
 # Distinct to colour-blind eyes and in grey.
 OF_ANSWERS = {RAIN: "#1f77b4", NOT_KNOWN: "#f2c14e"}
@@ -102,7 +101,7 @@ def removed_figure(held_out: Answers, title: str) -> Figure:
     return figure
 
 
-def answers_figure(scan: Scan, card: DataCard, called_rain: Mask, title: str) -> Figure:
+def answers_figure(scan: Scan, card: DataCard, called_rain: Bools, title: str) -> Figure:
     """A scan from above by its teacher's labels, by its student, and where they differ.
 
     Args:
@@ -144,7 +143,7 @@ def answers_figure(scan: Scan, card: DataCard, called_rain: Mask, title: str) ->
     return figure
 
 
-def _reach(scan: Scan, rain: Mask) -> float:
+def _reach(scan: Scan, rain: Bools) -> float:
     """Half the height of a picture that shows most of the rain, metres."""
     ranges = scan.range[rain & scan.valid]
     return max(LEAST_REACH, 1.3 * float(np.percentile(ranges, 95))) if len(ranges) else FAR
@@ -166,9 +165,7 @@ def _draw_by_scan(axes: Axes, scans: Sequence[AnswersOfScan]) -> None:
     axes.set_title("by scan", fontsize=10)
 
 
-def _draw_shares(
-    axes: Axes, places: NDArray[np.int64], answers: Sequence[Answers], width: float
-) -> None:
+def _draw_shares(axes: Axes, places: Ints, answers: Sequence[Answers], width: float) -> None:
     """Stacked bars: rain, and above it what is not known; the rest is not rain."""
     shares = np.array([one.shares for one in answers]).reshape(-1, len(TEACHERS_ANSWERS))
     shares = np.nan_to_num(shares)  # no bar where there are no points

@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.scan import Bools, Ints
+
 # Bright on dark, and distinct to colour-blind eyes.
 BACKGROUND = "#10151c"
 SOLID = "#7d8a99"
@@ -30,7 +32,7 @@ PROBABILITY = ("#2b3440", RAIN, "#ffffff")
 LINES = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#0072b2", "#d55e00")
 
 
-def outcomes(predicted: NDArray[np.bool_], rain: NDArray[np.bool_]) -> NDArray[np.int64]:
+def outcomes(predicted: Bools, rain: Bools) -> Ints:
     """Outcome of each point as a number of ``OUTCOMES``, int64 (N,).
 
     Args:

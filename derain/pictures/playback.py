@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import rerun
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from derain.errors import InputError, printable
@@ -17,7 +16,7 @@ from derain.pictures.entities import MethodEntities
 from derain.pictures.playback_layout import layout, write_static
 from derain.pictures.recording_file import RecordingFile, recording_file
 from derain.pictures.selection import PER_METRE, LabelledRain, Labels, Selection
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.judging import Guard, judgements, unguarded
@@ -204,7 +203,7 @@ class PlaybackWriter:
         self.file.log(place.missed, rerun.Points3D(missed, class_ids=entities.CLASS_MISSED))
         self._write_number(place.iou, Counts.of(rain[judged], found.rain[judged]).iou)
 
-    def _write_share(self, entity: str, part: NDArray[np.bool_], scan: Scan) -> None:
+    def _write_share(self, entity: str, part: Bools, scan: Scan) -> None:
         """Writes the share of the valid points, per cent, that a part of them is."""
         whole = np.count_nonzero(scan.valid)
         self._write_number(entity, 100 * float(ratio(np.count_nonzero(part & scan.valid), whole)))

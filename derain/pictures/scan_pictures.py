@@ -16,11 +16,11 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from derain.errors import InputError, printable
-from derain.evaluation.counts import Counts, Mask
+from derain.evaluation.counts import Counts
 from derain.evaluation.text_tables import number_text
 from derain.files.atomic import replacing
 from derain.pictures.palette import BACKGROUND, OUTCOMES, SOLID, WITHOUT_LABELS, outcomes
-from derain.scan import Scan
+from derain.scan import Bools, Floats, Ints, Scan
 from derain.system.open3d_import import import_open3d
 from derain.views.directions import directions
 
@@ -41,7 +41,7 @@ MOST_PANELS_IN_A_ROW = 5
 TITLE_WIDTH = 44
 
 
-def judgement_figure(scan: Scan, predicted: Mask, rain: Mask, title: str) -> Figure:
+def judgement_figure(scan: Scan, predicted: Bools, rain: Bools, title: str) -> Figure:
     """Input, truth, prediction and error of one scan, from above and as the sensor sees it.
 
     Args:
@@ -63,7 +63,7 @@ def judgement_figure(scan: Scan, predicted: Mask, rain: Mask, title: str) -> Fig
     return figure
 
 
-def before_after_figure(scan: Scan, predicted: Mask, title: str) -> Figure:
+def before_after_figure(scan: Scan, predicted: Bools, title: str) -> Figure:
     """One scan with the rain found in it, and without that rain.
 
     Args:
@@ -82,7 +82,7 @@ def before_after_figure(scan: Scan, predicted: Mask, title: str) -> Figure:
 
 
 def comparison_figure(
-    scan: Scan, predicted: Mapping[str, Mask], rain: Mask | None, title: str
+    scan: Scan, predicted: Mapping[str, Bools], rain: Bools | None, title: str
 ) -> Figure:
     """Input, truth, and each method's result, from above and as the sensor sees it.
 
@@ -108,9 +108,7 @@ def comparison_figure(
     return figure
 
 
-def _panels(
-    predicted: Mapping[str, Mask], rain: Mask | None
-) -> Iterator[tuple[str, NDArray[np.int64]]]:
+def _panels(predicted: Mapping[str, Bools], rain: Bools | None) -> Iterator[tuple[str, Ints]]:
     if rain is not None:
         yield f"truth: {rain.sum():,} points of rain", rain.astype(np.int64)
     for name, called_rain in predicted.items():
@@ -121,7 +119,7 @@ def _panels(
             yield f"{name}: IoU {iou}", outcomes(called_rain, rain)
 
 
-def show_comparison(scan: Scan, predicted: Mapping[str, Mask], rain: Mask | None) -> None:
+def show_comparison(scan: Scan, predicted: Mapping[str, Bools], rain: Bools | None) -> None:
     """Opens a window for each method, one after the other, in which to turn and zoom.
 
     Args:
@@ -219,7 +217,7 @@ def input_title(scan: Scan) -> str:
 
 def draw_columns(
     columns: NDArray[np.object_],
-    panels: Sequence[tuple[str, Scan, NDArray[np.int64] | None]],
+    panels: Sequence[tuple[str, Scan, Ints | None]],
     fontsize: float | str = "large",
 ) -> None:
     """Draws scans side by side, each from above and below that as the sensor sees it.
@@ -238,7 +236,7 @@ def draw_columns(
     ahead.set(ylabel="inclination / °", xlabel="azimuth, to the right / °")
 
 
-def draw_from_above(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -> None:
+def draw_from_above(axes: Axes, scan: Scan, outcome: Ints | None) -> None:
     """Draws a scan from above, in metres, forward being up; most points are within the limits.
 
     Args:
@@ -260,11 +258,7 @@ def draw_from_above(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -
 
 
 def scatter(
-    axes: Axes,
-    x: NDArray[np.floating],
-    y: NDArray[np.floating],
-    colours: NDArray[np.float64],
-    number: NDArray[np.int64],
+    axes: Axes, x: NDArray[np.floating], y: NDArray[np.floating], colours: Floats, number: Ints
 ) -> None:
     """Draws points, the rarest colour last and largest, so that none covers it.
 
@@ -291,7 +285,7 @@ def scatter(
     axes.tick_params(labelsize=8)
 
 
-def _draw_as_seen(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -> None:
+def _draw_as_seen(axes: Axes, scan: Scan, outcome: Ints | None) -> None:
     """Draws inclination over azimuth, in degrees, left being left."""
     seen = scan.valid
     azimuth, inclination = directions(scan.xyz[seen])
@@ -302,9 +296,7 @@ def _draw_as_seen(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -> 
         axes.set_ylim(*np.percentile(inclination, [0.1, 99.9]))
 
 
-def _colours(
-    scan: Scan, outcome: NDArray[np.int64] | None, rows: Mask
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _colours(scan: Scan, outcome: Ints | None, rows: Bools) -> tuple[Floats, Ints]:
     """Colours, RGBA (K, 4), and the number of each point's colour, by its outcome or intensity."""
     if outcome is not None:
         return to_rgba_array(list(OUTCOMES.values())), outcome[rows]

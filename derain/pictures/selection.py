@@ -14,7 +14,7 @@ from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.pictures.entities import SCAN, SHARE
 from derain.pictures.palette import shades
-from derain.scan import Scan
+from derain.scan import Bools, Floats, Scan
 from derain.sources.frame import Frame, times_of
 from derain.sources.method import Method
 from derain.sources.reader import FrameReader
@@ -95,7 +95,7 @@ class Selection:
         return {f.key: time - times[0] for f, time in zip(self.frames, times, strict=True)}
 
     @cached_property
-    def poses(self) -> dict[str, NDArray[np.float64]]:
+    def poses(self) -> dict[str, Floats]:
         """Pose of each shown frame, by the frame's key, float64 (4, 4), metres.
 
         A pose takes the sensor's frame to that of the first scan shown of its sequence: the viewer
@@ -105,7 +105,7 @@ class Selection:
         Raises:
             InputError: Poses that are damaged.
         """
-        to_first: dict[str, NDArray[np.float64]] = {}
+        to_first: dict[str, Floats] = {}
         placed = {}
         for frame in self.frames:
             pose = frame.pose
@@ -123,7 +123,7 @@ class Selection:
     @cached_property
     def paths(self) -> list[NDArray[np.float32]]:
         """The sensor's path in each sequence, float32 (scans, 3), metres."""
-        paths: dict[str, list[NDArray[np.float64]]] = {}
+        paths: dict[str, list[Floats]] = {}
         for frame in self.frames:
             if frame.key in self.poses:
                 paths.setdefault(frame.sequence, []).append(self.poses[frame.key][:3, 3])
@@ -188,8 +188,8 @@ class LabelledRain:
         known: False for points whose label is unknown, bool (N,).
     """
 
-    rain: NDArray[np.bool_]
-    known: NDArray[np.bool_]
+    rain: Bools
+    known: Bools
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 from matplotlib.transforms import Bbox
-from numpy.typing import NDArray
+
+from derain.scan import Floats
 
 # Smaller errors are drawn as this one: a logarithmic axis has no place for an error of 0.
 LEAST_ERROR = 1e-4
@@ -136,7 +137,7 @@ def _label(axes: Axes, standings: Sequence[Standing]) -> None:
         taken.append(boxes[chosen])
 
 
-def _size(axes: Axes, label: str) -> NDArray[np.float64]:
+def _size(axes: Axes, label: str) -> Floats:
     """Width and height of a label, float64 (2,), pixels."""
     text = axes.text(0, 0, label, fontsize=FONT_SIZE)
     size = np.array(text.get_window_extent().size)
@@ -144,10 +145,10 @@ def _size(axes: Axes, label: str) -> NDArray[np.float64]:
     return size
 
 
-def _gaps(box: Bbox, places: NDArray[np.float64]) -> NDArray[np.float64]:
+def _gaps(box: Bbox, places: Floats) -> Floats:
     """Distance of each place, (n, 2), from a box, float64 (n,), in the box's unit."""
     beyond = np.maximum(np.maximum(box.min - places, places - box.max), 0)
-    gaps: NDArray[np.float64] = np.hypot(*beyond.T)
+    gaps: Floats = np.hypot(*beyond.T)
     return gaps
 
 

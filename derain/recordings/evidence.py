@@ -11,10 +11,9 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.recordings.rays import RayEvidence, Rays, ray_evidence
-from derain.scan import Scan
+from derain.scan import Bools, Floats, Scan
 from derain.views.morton import distinct_rows
 from derain.views.neighbour_search import NeighbourSearch
 from derain.views.scatter import scatter_through_space
@@ -74,10 +73,7 @@ class ScanPoints:
         return len(self.xyz)
 
     def evidence_of(
-        self,
-        other: Self,
-        to_other: NDArray[np.float64],
-        at_drops: NDArray[np.bool_] | None = None,
+        self, other: Self, to_other: Floats, at_drops: Bools | None = None
     ) -> RayEvidence:
         """The evidence of another scan's rays at the points of this one.
 
@@ -95,7 +91,7 @@ class ScanPoints:
         return Rays(self.xyz, self._threads)
 
 
-def surroundings_features(points: ScanPoints) -> NDArray[np.float64]:
+def surroundings_features(points: ScanPoints) -> Floats:
     """Describes the surroundings of each point by three numbers, their squares and products.
 
     The numbers are logarithms: of the mean distance of a point's neighbours in steps of the
@@ -123,14 +119,14 @@ def surroundings_features(points: ScanPoints) -> NDArray[np.float64]:
     )
 
 
-def combined_log_odds(points: ScanPoints, evidence: RayEvidence | None) -> NDArray[np.float64]:
+def combined_log_odds(points: ScanPoints, evidence: RayEvidence | None) -> Floats:
     """Log-odds of rain of each point without its neighbours' votes, float64 (M,).
 
     Args:
         points: M points of a scan.
         evidence: That of the rays of other scans; None where there is no other scan.
     """
-    log_odds: NDArray[np.float64] = surroundings_features(points) @ np.array(SURROUNDINGS_WEIGHTS)
+    log_odds: Floats = surroundings_features(points) @ np.array(SURROUNDINGS_WEIGHTS)
     if evidence is None:
         return log_odds
     any_point, ending, through = RAY_WEIGHTS
@@ -138,7 +134,7 @@ def combined_log_odds(points: ScanPoints, evidence: RayEvidence | None) -> NDArr
     return log_odds + by_rays - PRIOR
 
 
-def vote(points: ScanPoints, log_odds: NDArray[np.float64]) -> NDArray[np.float64]:
+def vote(points: ScanPoints, log_odds: Floats) -> Floats:
     """Log-odds of rain of each point and its neighbours together.
 
     Args:
@@ -152,5 +148,5 @@ def vote(points: ScanPoints, log_odds: NDArray[np.float64]) -> NDArray[np.float6
     half_at = (offset + slope * points.rays.range)[:, None]
     weight = 1 / (1 + np.square(points.distances / half_at))
     votes = np.clip(log_odds, -LARGEST_LOG_ODDS, LARGEST_LOG_ODDS).take(points.neighbours)
-    total: NDArray[np.float64] = np.einsum("ij,ij->i", weight, votes)
+    total: Floats = np.einsum("ij,ij->i", weight, votes)
     return total

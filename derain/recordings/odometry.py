@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 from statistics import median
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.recordings.surfaces import Fit, Surfaces
-from derain.scan import Scan
+from derain.scan import Floats, Scan
 from derain.sources.frame import Frame, time_of
 from derain.system.cores import threads_of
 from derain.views.scan_issues import ScanIssue
@@ -67,8 +66,8 @@ class Registration:
         reason: Why not; empty where it is trusted.
     """
 
-    motion: NDArray[np.float64]
-    pose: NDArray[np.float64]
+    motion: Floats
+    pose: Floats
     residual: float
     matched: float
     trusted: bool
@@ -91,7 +90,7 @@ class Registration:
             yield ScanIssue("its pose is not known", detail)
 
 
-def shift_of(motion: NDArray[np.float64]) -> float:
+def shift_of(motion: Floats) -> float:
     """Length of a motion, metres.
 
     Args:
@@ -100,7 +99,7 @@ def shift_of(motion: NDArray[np.float64]) -> float:
     return float(np.linalg.norm(motion[:3, 3]))
 
 
-def turn_of(motion: NDArray[np.float64]) -> float:
+def turn_of(motion: Floats) -> float:
     """Angle of a rotation about its own axis, degrees, 0..180.
 
     Args:
@@ -117,7 +116,7 @@ class Trust:
 
     def __init__(self) -> None:
         self._residuals: list[float] = []
-        self._motions: list[NDArray[np.float64]] = []  # the last trusted one, and the last one
+        self._motions: list[Floats] = []  # the last trusted one, and the last one
 
     def misfit(self, fit: Fit) -> str:
         """Reason why two scans cannot be registered; empty if they can.
@@ -139,7 +138,7 @@ class Trust:
             return "too few surfaces face some direction to measure the motion along it"
         return "" if fit.converged else "the search for the motion did not converge"
 
-    def unlikely(self, motion: NDArray[np.float64]) -> str:
+    def unlikely(self, motion: Floats) -> str:
         """Reason why no vehicle moves in this way between two scans; empty if one can.
 
         Args:
@@ -178,7 +177,7 @@ class Trust:
         return min(MOST_APART, max(WELL_ENOUGH, TIMES_THE_USUAL * median(self._residuals)))
 
 
-def _is_small(change: NDArray[np.float64]) -> bool:
+def _is_small(change: Floats) -> bool:
     return shift_of(change) <= LARGEST_CHANGE and turn_of(change) <= LARGEST_CHANGE_OF_TURN
 
 
@@ -211,7 +210,7 @@ class Odometry:
     def restart(self) -> None:
         """Forgets all scans: the next one is the first of a sequence."""
         self._before: Surfaces | None = None
-        self._expected: NDArray[np.float64] | None = None  # the last motion, which goes on
+        self._expected: Floats | None = None  # the last motion, which goes on
         self._pose = np.eye(4)
         self._trust = Trust()
 
@@ -253,7 +252,7 @@ class Odometry:
         """The pose extrapolated at constant velocity."""
         return self._moved(np.eye(4) if self._expected is None else self._expected, fit, reason)
 
-    def _moved(self, motion: NDArray[np.float64], fit: Fit | None, reason: str) -> Registration:
+    def _moved(self, motion: Floats, fit: Fit | None, reason: str) -> Registration:
         self._pose = self._pose @ motion
         residual, matched = (np.nan, 0.0) if fit is None else (fit.residual, fit.matched)
         return Registration(motion, self._pose, residual, matched, not reason, reason)

@@ -6,14 +6,13 @@ from typing import Any, ClassVar, Self
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.files.documents import Entry
 from derain.recordings.evidence import ScanPoints, combined_log_odds, vote
 from derain.recordings.placing import PlacedFrames, PlacedMethod
 from derain.recordings.rays import RayEvidence, mean_evidence
 from derain.recordings.recording_method import METHODS, RecordingMethod
-from derain.scan import Scan
+from derain.scan import Bools, Floats, Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.recent_frames import FrameInWindow
@@ -157,11 +156,7 @@ class PersistenceDerainer(PlacedMethod, RecordingMethod):
 
 
 def _by_row(
-    scan: Scan,
-    points: ScanPoints,
-    log_odds: NDArray[np.float64],
-    known: NDArray[np.bool_],
-    frame: Frame,
+    scan: Scan, points: ScanPoints, log_odds: Floats, known: Bools, frame: Frame
 ) -> Judgement:
     """The judgement of the rows of a scan, by that of its points."""
     judged = points.inverse >= 0

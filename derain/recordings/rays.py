@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.scan import Scan
+from derain.scan import Bools, Floats, Ints, Scan
 from derain.system.cores import sleeping_threads
 from derain.views.morton import distinct_rows
 
@@ -59,13 +59,11 @@ class Rays:
         rows: Rows of the scan that they are of, int64 (M,); by default 0 to M - 1.
     """
 
-    def __init__(
-        self, xyz: NDArray[np.floating], threads: int, rows: NDArray[np.int64] | None = None
-    ) -> None:
+    def __init__(self, xyz: NDArray[np.floating], threads: int, rows: Ints | None = None) -> None:
         self.rows = np.arange(len(xyz)) if rows is None else rows
         wide = xyz.astype(np.float64)
         self.range = range_of(wide)
-        self.directions: NDArray[np.float64] = wide / self.range[:, None]
+        self.directions: Floats = wide / self.range[:, None]
         self._threads = threads
         self._tree = small_gicp.KdTree(self.directions, num_threads=threads) if len(wide) else None
 
@@ -87,9 +85,7 @@ class Rays:
         _, chords = self.nearest(self.directions[some], STEP_NEIGHBOUR + 1)
         return float(np.median(chords[:, STEP_NEIGHBOUR]))
 
-    def nearest(
-        self, directions: NDArray[np.float64], count: int
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def nearest(self, directions: Floats, count: int) -> tuple[Ints, Floats]:
         """The rays that are nearest to some directions.
 
         Args:
@@ -113,14 +109,14 @@ class Rays:
         return rays, angles
 
 
-def range_of(xyz: NDArray[np.float64]) -> NDArray[np.float64]:
+def range_of(xyz: Floats) -> Floats:
     """Distance of places from the origin, metres, float64 (M,); a centimetre at least.
 
     Args:
         xyz: Coordinates, float64 (M, 3), metres.
     """
     x, y, z = np.ascontiguousarray(xyz.T)
-    distance: NDArray[np.float64] = np.maximum(np.sqrt(x * x + y * y + z * z), NEAREST)
+    distance: Floats = np.maximum(np.sqrt(x * x + y * y + z * z), NEAREST)
     return distance
 
 
@@ -134,8 +130,8 @@ class RayEvidence:
         through: Share of them that went through it to something behind, float64 (M,).
     """
 
-    ending: NDArray[np.float64]
-    through: NDArray[np.float64]
+    ending: Floats
+    through: Floats
 
     def __getitem__(self, places: slice) -> "RayEvidence":
         """The evidence at some of the places."""
@@ -143,10 +139,7 @@ class RayEvidence:
 
 
 def ray_evidence(
-    places: NDArray[np.float64],
-    rays: Rays,
-    step: float,
-    at_drops: NDArray[np.bool_] | None = None,
+    places: Floats, rays: Rays, step: float, at_drops: Bools | None = None
 ) -> RayEvidence:
     """Finds how the rays of a scan pass some places.
 

@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from derain.scan import Scan
+from derain.scan import Floats, Scan
 from derain.system.cores import sleeping_threads
 from derain.views.morton import distinct_rows
 
@@ -52,7 +51,7 @@ class Fit:
             0..1: of a flat road alone, along which scans slide, it is 0.
     """
 
-    motion: NDArray[np.float64]
+    motion: Floats
     converged: bool
     residual: float
     matched: float
@@ -89,7 +88,7 @@ class Surfaces:
         """True if anything can be laid upon them."""
         return len(self) >= FEWEST_SURFACES
 
-    def onto(self, other: "Surfaces", start: NDArray[np.float64], within: float) -> Fit:
+    def onto(self, other: "Surfaces", start: Floats, within: float) -> Fit:
         """Lays these surfaces upon those of another scan.
 
         Args:
@@ -111,7 +110,7 @@ class Surfaces:
         residual, matched = self._distances(other, motion)
         return Fit(motion, found.converged, residual, matched, _facing(found))
 
-    def _distances(self, other: "Surfaces", motion: NDArray[np.float64]) -> tuple[float, float]:
+    def _distances(self, other: "Surfaces", motion: Floats) -> tuple[float, float]:
         """Median distance of partners across their surface, and the share within a voxel."""
         moved = self._cloud.points()[:, :3] @ motion[:3, :3].T + motion[:3, 3]
         assert other._tree is not None  # they are enough
@@ -124,7 +123,7 @@ class Surfaces:
         return residual, float((squared <= VOXEL**2).mean())
 
 
-def _points_in_reach(scan: Scan) -> NDArray[np.float64]:
+def _points_in_reach(scan: Scan) -> Floats:
     """Distinct positions neither too near nor too far, spread over the scan, float64 (M, 3)."""
     rows, _ = distinct_rows(scan)
     distance = scan.range[rows]

@@ -8,7 +8,7 @@ what stands behind a drop. They are found by direction alone, in a small part of
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.scan import Scan
+from derain.scan import Bools, Ints, Scan
 
 # Sectors of azimuth, each of 30 degrees like the hours of a clock: the first has x (ahead) in its
 # middle, the next ones follow towards y (left).
@@ -39,7 +39,7 @@ SCORES_IN_SECTOR = 2048
 BITS_OF_END = (RAY_SECTORS * SCORES_IN_SECTOR).bit_length()
 
 
-def ray_ends(scan: Scan, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
+def ray_ends(scan: Scan, rain: Bools) -> Ints:
     """Counts the rays of a scan by where they end.
 
     A ray that met rain ends at the nearest return of it that is rain, even where something else was
@@ -104,14 +104,14 @@ def _sectors_of_cells() -> NDArray[np.int32]:
 SECTOR_OF_CELL = _sectors_of_cells()
 
 
-def _scores(reach: NDArray[np.float32], rain: NDArray[np.bool_]) -> NDArray[np.int32]:
+def _scores(reach: NDArray[np.float32], rain: Bools) -> NDArray[np.int32]:
     """Priority of returns among those of their ray, int32 (M,): rain first, the nearest of it."""
     place = np.minimum(reach / BIN, RANGE_BINS - 1)  # not above the last bin, however far
     scores: NDArray[np.int32] = place.astype(np.int32)
     return np.where(rain, SCORES_IN_SECTOR - 1 - scores, scores)
 
 
-def _counted(ends: NDArray[np.int64]) -> NDArray[np.int64]:
+def _counted(ends: Ints) -> Ints:
     """Numbers of rays by what they end at, sector and bin, int64 (2, RAY_SECTORS, RANGE_BINS)."""
     counts = np.bincount(ends, minlength=RAY_SECTORS * SCORES_IN_SECTOR)
     counts = counts.reshape(RAY_SECTORS, SCORES_IN_SECTOR)

@@ -5,8 +5,8 @@ from dataclasses import dataclass, fields
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from derain.scan import Floats
 from derain.weather.alarm import Level
 from derain.weather.rays import RAY_SECTORS
 from derain.weather.scan_weather import RANGE_BANDS, ScanWeather
@@ -97,6 +97,6 @@ def _rounded(metres: float | None) -> float | None:
     return None if metres is None or math.isinf(metres) else round(metres, 2)
 
 
-def _known(shares: NDArray[np.float64]) -> list[float | None]:
+def _known(shares: Floats) -> list[float | None]:
     """Shares of one row, None where they are not known."""
     return [None if np.isnan(share) else round(float(share), SHARE_DIGITS) for share in shares]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.scan import Scan
+from derain.scan import Bools, Floats, Ints, Scan
 from derain.weather.rays import BIN, RANGE_BINS, RAY_SECTORS, ray_ends
 from derain.weather.visibility import NOT_KNOWN, Visibility, reach_of, visibility_of
 
@@ -40,10 +40,10 @@ class ScanWeather:
             end at rain; by sector of azimuth and by bin of range (:mod:`derain.weather.rays`).
     """
 
-    ends: NDArray[np.int64]
+    ends: Ints
 
     @classmethod
-    def of(cls, points: Scan | NDArray[Any], rain: NDArray[np.bool_]) -> Self:
+    def of(cls, points: Scan | NDArray[Any], rain: Bools) -> Self:
         """The weather of a judged scan.
 
         Args:
@@ -79,13 +79,13 @@ class ScanWeather:
         return int(self.ends[1].sum())
 
     @cached_property  # by sector, by range and together, what is shown is made of it
-    def banded(self) -> NDArray[np.int64]:
+    def banded(self) -> Ints:
         """The same numbers by bands of range, int64 (2, RAY_SECTORS, len(RANGE_BANDS))."""
         first_bins = [int(band / BIN) for band in RANGE_BANDS]
         return np.add.reduceat(self.ends, first_bins, axis=2)
 
     @property
-    def shares(self) -> NDArray[np.float64]:
+    def shares(self) -> Floats:
         """Share of rain in the rays that end in a sector and band.
 
         It is float64 (RAY_SECTORS, len(RANGE_BANDS)).
@@ -95,7 +95,7 @@ class ScanWeather:
         return _shares(self.banded)
 
     @property
-    def shares_by_sector(self) -> NDArray[np.float64]:
+    def shares_by_sector(self) -> Floats:
         """Share of the rays of each sector that met rain.
 
         It is float64 (RAY_SECTORS,); NaN without any.
@@ -103,7 +103,7 @@ class ScanWeather:
         return _shares(self.ends.sum(axis=2))
 
     @property
-    def shares_by_range(self) -> NDArray[np.float64]:
+    def shares_by_range(self) -> Floats:
         """Share of rain in the rays that end in each band.
 
         It is float64 (len(RANGE_BANDS),); NaN likewise.
@@ -157,9 +157,9 @@ def dry_reach(dry: Iterable[ScanWeather]) -> Visibility:
     return known[int(SHARE_OF_DRY_BELOW * len(known))] if known else NOT_KNOWN
 
 
-def _shares(ends: NDArray[np.int64]) -> NDArray[np.float64]:
+def _shares(ends: Ints) -> Floats:
     """Share of rain in numbers (2, ...), float64 (...); NaN where there are none."""
     total = ends.sum(axis=0)
-    shares: NDArray[np.float64] = np.full(total.shape, np.nan)
+    shares: Floats = np.full(total.shape, np.nan)
     np.divide(ends[1], total, out=shares, where=total > 0)
     return shares

@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from derain.scan import Ints
 from derain.weather.rays import BIN
 
 # Visibility is the range that this share of the rays gets through.
@@ -78,7 +78,7 @@ class Visibility:
 NOT_KNOWN = Visibility(None, 0.0, math.inf)
 
 
-def visibility_of(other: NDArray[np.int64], rain: NDArray[np.int64]) -> Visibility:
+def visibility_of(other: Ints, rain: Ints) -> Visibility:
     """The range that 90 % of the rays would get through if it rained alike everywhere.
 
     The rate at which rays meet rain is their number over the metres that all rays go, in the first
@@ -115,7 +115,7 @@ def visibility_of(other: NDArray[np.int64], rain: NDArray[np.int64]) -> Visibili
     )
 
 
-def reach_of(ending: NDArray[np.int64], share: float) -> Visibility:
+def reach_of(ending: Ints, share: float) -> Visibility:
     """The range within which a share of the rays end.
 
     Args:
@@ -150,7 +150,7 @@ def poisson_interval(count: int) -> tuple[float, float]:
     return end(count, -ONE_IN_TWENTY) if count else 0.0, end(count + 1, ONE_IN_TWENTY)
 
 
-def _within(ending: NDArray[np.int64], share: float) -> float:
+def _within(ending: Ints, share: float) -> float:
     """Metres within which a share of the rays end; infinite beyond the bins and for all rays."""
     ended = ending.cumsum()
     wanted = share * int(ended[-1])
