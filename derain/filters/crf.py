@@ -1,6 +1,6 @@
 """The filter of conditional random fields."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar, Literal
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.filters.airborne import Around, fit_rain_bounds
 from derain.filters.ground import find_ground
-from derain.filters.point_filter import FILTERS, PointFilter, RainAndPoints, Span, filter_view
+from derain.filters.point_filter import FILTERS, PointFilter, RainAndPoints, filter_view
 from derain.filters.random_field import decide_sequentially
 from derain.scan import Bools, Floats, Ints, Scan
 from derain.system.stopwatch import Stopwatch
@@ -96,14 +96,14 @@ class CRF(PointFilter):
         by azimuth and the fitted bounds are derain's own.
     """
 
-    HELP: ClassVar[str] = "rain is near, above the ground, as bright as drops are, and beside rain"
-    SPACE: ClassVar[Mapping[str, Span]] = {
+    HELP = "rain is near, above the ground, as bright as drops are, and beside rain"
+    SPACE: ClassVar = {
         "neighbours": (FEWEST_NEIGHBOURS, 12),
         "vote": (0.1, 20.0),
         "sparseness": (1.5, 10.0),
         "reach": (0.5, 5.0),
     }
-    FULL_SCALE: ClassVar[float] = 255.0
+    FULL_SCALE = 255.0
 
     neighbours: int = 8
     variant: Literal["fitted", "published"] = "fitted"
@@ -200,8 +200,7 @@ class CRF(PointFilter):
             least, largest = float(feature.min()), float(feature.max())
         if largest == least:  # nothing stands out
             return np.full(len(feature), -1.0)
-        scaled: Floats = 2 * (feature - least) / (largest - least) - 1
-        return scaled
+        return np.asarray(2 * (feature - least) / (largest - least) - 1)
 
 
 def _along_the_sweep(xyz: Floats) -> Ints:

@@ -1,12 +1,11 @@
 """SOR and DSOR, by which a point is rain if it lies farther from its neighbours than is usual."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from derain.filters.point_filter import FILTERS, TUNED_NEIGHBOURS, PointFilter, Span
+from derain.filters.point_filter import FILTERS, TUNED_NEIGHBOURS, PointFilter
 from derain.scan import Bools, Floats
 from derain.views.neighbours import Neighbourhoods
 
@@ -40,11 +39,8 @@ class SOR(PointFilter):
         which extends it.
     """
 
-    HELP: ClassVar[str] = "rain lies farther from its neighbours than is usual in the scan"
-    SPACE: ClassVar[Mapping[str, Span]] = {
-        "neighbours": TUNED_NEIGHBOURS,
-        "deviation_multiplier": (0.001, 10.0),
-    }
+    HELP = "rain lies farther from its neighbours than is usual in the scan"
+    SPACE: ClassVar = {"neighbours": TUNED_NEIGHBOURS, "deviation_multiplier": (0.001, 10.0)}
 
     neighbours: int = 5
     deviation_multiplier: float = 0.01
@@ -83,8 +79,8 @@ class DSOR(PointFilter):
         LiDAR Point Clouds in Severe Winter Weather", arXiv 2109.07078, 2021, and its defaults.
     """
 
-    HELP: ClassVar[str] = "rain lies farther from its neighbours than is usual at its range"
-    SPACE: ClassVar[Mapping[str, Span]] = {
+    HELP = "rain lies farther from its neighbours than is usual at its range"
+    SPACE: ClassVar = {
         "neighbours": TUNED_NEIGHBOURS,
         "deviation_multiplier": (0.001, 10.0),
         "range_multiplier": (0.002, 2.0),
@@ -101,8 +97,7 @@ class DSOR(PointFilter):
         distance = mean_distance(view, self.neighbours)
         x, y, z = view.points[:, :3].T.astype(np.float64)
         reach = self.range_multiplier * np.sqrt(x * x + y * y + z * z)
-        rain: Bools = distance >= usual_limit(distance, self.deviation_multiplier) * reach
-        return rain
+        return np.asarray(distance >= usual_limit(distance, self.deviation_multiplier) * reach)
 
 
 def mean_distance(view: Neighbourhoods, neighbours: int) -> Floats:

@@ -7,14 +7,13 @@ along the curve: only the remaining ones are searched for.
 
 import math
 from abc import abstractmethod
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.filters.point_filter import FILTERS, TUNED_NEIGHBOURS, PointFilter, RainAndPoints, Span
+from derain.filters.point_filter import FILTERS, TUNED_NEIGHBOURS, PointFilter, RainAndPoints
 from derain.scan import Bools, Floats, Ints, Scan
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
@@ -95,11 +94,8 @@ class ROR(RadiusFilter):
         are those of github.com/nickcharron/lidar_snow_removal (3 others, 0.08 m).
     """
 
-    HELP: ClassVar[str] = "rain has few points within a radius"
-    SPACE: ClassVar[Mapping[str, Span]] = {
-        "neighbours": TUNED_NEIGHBOURS,
-        "radius": (0.01, 3.0),
-    }
+    HELP = "rain has few points within a radius"
+    SPACE: ClassVar = {"neighbours": TUNED_NEIGHBOURS, "radius": (0.01, 3.0)}
 
     neighbours: int = 4
     radius: float = 0.08
@@ -146,9 +142,9 @@ class DROR(RadiusFilter):
         by Snowfall", CRV 2018, and github.com/nickcharron/lidar_snow_removal.
     """
 
-    HELP: ClassVar[str] = "rain has few points within a radius that grows with range"
+    HELP = "rain has few points within a radius that grows with range"
     # Of multiplier and resolution only the product counts: one of them is looked for.
-    SPACE: ClassVar[Mapping[str, Span]] = {
+    SPACE: ClassVar = {
         "neighbours": TUNED_NEIGHBOURS,
         "radius_multiplier": (0.3, 30.0),
         "minimum_radius": (0.005, 1.0),

@@ -1,13 +1,13 @@
 """The label-free teacher of 3D-UnOutDet."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from derain.filters.point_filter import FILTERS, TUNED_NEIGHBOURS, PointFilter, Span
+from derain.filters.point_filter import FILTERS, TUNED_NEIGHBOURS, PointFilter
 from derain.scan import Bools, Scan
 from derain.views.neighbours import Neighbourhoods
 from derain.views.scan_issues import ScanIssue, intensity_of_another_scale, missing_intensity
@@ -38,12 +38,9 @@ class SSR(PointFilter):
         its norm after a Fourier transform is √k times that before.
     """
 
-    HELP: ClassVar[str] = "rain is dim, and so are its neighbours, in relation to their distances"
-    SPACE: ClassVar[Mapping[str, Span]] = {
-        "neighbours": TUNED_NEIGHBOURS,
-        "threshold": (0.01, 1e6),
-    }
-    FULL_SCALE: ClassVar[float] = 255.0
+    HELP = "rain is dim, and so are its neighbours, in relation to their distances"
+    SPACE: ClassVar = {"neighbours": TUNED_NEIGHBOURS, "threshold": (0.01, 1e6)}
+    FULL_SCALE = 255.0
 
     neighbours: int = 9
     threshold: float = 2.5

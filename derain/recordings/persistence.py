@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -82,7 +82,7 @@ class PersistenceDerainer(PlacedMethod, RecordingMethod):
         Grids for Mobile Robot Perception and Navigation", 1989), with rays instead of cells.
     """
 
-    HELP: ClassVar[str] = "rain does not stay in its place: rays of other scans pass through it"
+    HELP = "rain does not stay in its place: rays of other scans pass through it"
 
     def __init__(self, persistence: Persistence = Persistence(), threads: int = 0) -> None:
         self.persistence = persistence
