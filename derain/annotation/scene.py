@@ -65,14 +65,12 @@ class Rectangle:
         """True for points, float64 (N, 2), metres, inside or on the outline; bool (N,)."""
         ahead, left = self.relative(points).T
         length, width = self.size
-        inside: Bools = (np.abs(ahead) <= length / 2) & (np.abs(left) <= width / 2)
-        return inside
+        return np.asarray((np.abs(ahead) <= length / 2) & (np.abs(left) <= width / 2))
 
     def corners(self) -> Floats:
         """Its corners x, y in order, float64 (4, 2), metres."""
         halves = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) / 2
-        corners: Floats = (halves * self.size) @ self._axes.T + self.centre
-        return corners
+        return (halves * self.size) @ self._axes.T + self.centre
 
     @property
     def _axes(self) -> Floats:
@@ -183,8 +181,7 @@ def inside(polygon: Polygon, points: Floats) -> Bools:
     Returns:
         bool (N,).
     """
-    within: Bools = Outline(polygon).contains_points(points[:, :2])
-    return within
+    return Outline(polygon).contains_points(points[:, :2])
 
 
 def read_scene(path: Path) -> Scene:

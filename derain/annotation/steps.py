@@ -78,8 +78,7 @@ class Plane:
         Returns:
             float64 (N,), metres.
         """
-        height: Floats = points @ np.array(self.normal) + self.offset
-        return height
+        return np.asarray(points @ np.array(self.normal) + self.offset)
 
     @property
     def slope(self) -> float:
@@ -165,8 +164,7 @@ def _bare_road(scan: Scan, scene: Scene) -> Floats:
     """Points over the road and in no box, float64 (M, 3), metres."""
     points = scan.xyz[scan.valid].astype(np.float64)
     points = points[inside(scene.road, points)]
-    bare: Floats = points[_boxed(points, scene) == NO_BOX]
-    return bare
+    return np.asarray(points[_boxed(points, scene) == NO_BOX])
 
 
 def _boxed(points: Floats, scene: Scene) -> Ints:

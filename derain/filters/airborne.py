@@ -121,8 +121,7 @@ def _is_airborne(
     neighbours, distances = neighbourhoods
     spacing = distances.T.astype(np.float64).mean(axis=0) / distance
     sparse = spacing > sparseness * np.median(spacing)
-    airborne: Bools = sparse & (scatter_through_space(xyz, neighbours) > OFF_SURFACES)
-    return airborne
+    return np.asarray(sparse & (scatter_through_space(xyz, neighbours) > OFF_SURFACES))
 
 
 def _greatest_difference(

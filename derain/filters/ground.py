@@ -68,8 +68,7 @@ class Ground:
             xyz: Coordinates, (M, 3), metres, sensor frame.
         """
         x, y, z = np.array(xyz.T, np.float64, order="C")
-        is_above: Bools = z - (self.slope_x * x + self.slope_y * y + self.offset) > IN_PLANE
-        return is_above
+        return np.asarray(z - (self.slope_x * x + self.slope_y * y + self.offset) > IN_PLANE)
 
 
 def find_ground(xyz: NDArray[np.floating[Any]]) -> Ground | None:

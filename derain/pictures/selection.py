@@ -175,8 +175,7 @@ class SensorLook:
     def centimetres(self, seen: RangeImage) -> NDArray[np.uint16]:
         """The range of each pixel, uint16 (H, W), centimetres; 0 where nothing returned."""
         ranges = np.where(seen.valid, seen.nearest, 0) * PER_METRE
-        pixels: NDArray[np.uint16] = np.clip(ranges, 0, 65535).round().astype(np.uint16)
-        return pixels
+        return np.asarray(np.clip(ranges, 0, 65535).round().astype(np.uint16))
 
 
 @dataclass(frozen=True, eq=False)

@@ -148,8 +148,7 @@ def _size(axes: Axes, label: str) -> Floats:
 def _gaps(box: Bbox, places: Floats) -> Floats:
     """Distance of each place, (n, 2), from a box, float64 (n,), in the box's unit."""
     beyond = np.maximum(np.maximum(box.min - places, places - box.max), 0)
-    gaps: Floats = np.hypot(*beyond.T)
-    return gaps
+    return np.asarray(np.hypot(*beyond.T))
 
 
 def _annotate(axes: Axes, standing: Standing, place: int) -> None:

@@ -148,5 +148,4 @@ def vote(points: ScanPoints, log_odds: Floats) -> Floats:
     half_at = (offset + slope * points.rays.range)[:, None]
     weight = 1 / (1 + np.square(points.distances / half_at))
     votes = np.clip(log_odds, -LARGEST_LOG_ODDS, LARGEST_LOG_ODDS).take(points.neighbours)
-    total: Floats = np.einsum("ij,ij->i", weight, votes)
-    return total
+    return np.asarray(np.einsum("ij,ij->i", weight, votes))

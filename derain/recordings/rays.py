@@ -116,8 +116,7 @@ def range_of(xyz: Floats) -> Floats:
         xyz: Coordinates, float64 (M, 3), metres.
     """
     x, y, z = np.ascontiguousarray(xyz.T)
-    distance: Floats = np.maximum(np.sqrt(x * x + y * y + z * z), NEAREST)
-    return distance
+    return np.asarray(np.maximum(np.sqrt(x * x + y * y + z * z), NEAREST))
 
 
 @dataclass(frozen=True, eq=False)

@@ -174,8 +174,7 @@ class _Window:
         column = pixel - row * self._width + right.take(best)
         if self._wraps:
             column %= self._width
-        chosen: Ints = (row + down.take(best)) * self._width + column
-        return chosen
+        return np.asarray((row + down.take(best)) * self._width + column)
 
     def share_of_votes(self, pixel: Ints, distance: NDArray[np.float32], rain: Bools) -> Floats:
         """Share of rain among the votes of the pixels around each pixel, float64 (N,)."""
@@ -190,8 +189,7 @@ class _Window:
         chosen = np.ascontiguousarray(chosen.T).view(VOTER)
         votes = chosen["difference"] <= CUTOFF
         for_rain = chosen["ballot"] % 2 == 1
-        share: Floats = (votes & for_rain).sum(axis=0) / votes.sum(axis=0)
-        return share
+        return np.asarray((votes & for_rain).sum(axis=0) / votes.sum(axis=0))
 
     def _differences(
         self, pixel: Ints, distance: NDArray[np.float32]
@@ -203,5 +201,4 @@ class _Window:
 
     def _corner(self, pixel: Ints) -> Ints:
         """Start of the window around each pixel in the padded image, int64 (N,)."""
-        corner: Ints = pixel + pixel // self._width * (2 * REACH)
-        return corner
+        return np.asarray(pixel + pixel // self._width * (2 * REACH))

@@ -121,5 +121,4 @@ def _azimuth(turn: NDArray[Any]) -> Floats:
     """Azimuth of a turn, degrees."""
     distance = turn / (BINS // 4) - 2
     x = 1 - np.abs(distance)
-    azimuth: Floats = np.degrees(np.arctan2(np.copysign(1 - np.abs(x), distance), x))
-    return azimuth
+    return np.asarray(np.degrees(np.arctan2(np.copysign(1 - np.abs(x), distance), x)))

@@ -216,8 +216,7 @@ def _directions(xyz: NDArray[np.float32]) -> Floats:
     """Unit vectors to some points, float64 (3, Q)."""
     axes = np.array(xyz.T, np.float64, order="C")
     length = np.maximum(np.sqrt(np.square(axes).sum(axis=0)), NEAREST_POINT)
-    directions: Floats = axes / length
-    return directions
+    return np.asarray(axes / length)
 
 
 def crowding(xyz: NDArray[np.float32], step: float) -> NDArray[np.float32]:

@@ -50,8 +50,7 @@ def morton_code(xyz: NDArray[np.float32]) -> NDArray[np.uint64]:
     scale = (2**BITS_PER_AXIS - 1) / size if size > 0 else 0.0
     columns *= scale
     x, y, z = columns.astype(np.uint16)
-    code: NDArray[np.uint64] = _SPREAD[x] | _SPREAD[y] << np.uint64(1) | _SPREAD[z] << np.uint64(2)
-    return code
+    return np.asarray(_SPREAD[x] | _SPREAD[y] << np.uint64(1) | _SPREAD[z] << np.uint64(2))
 
 
 def distinct_positions(xyz: NDArray[np.float32]) -> tuple[Ints, Ints]:
@@ -95,8 +94,7 @@ def _differ(xyz: NDArray[np.float32], order: Ints, places: Ints) -> Bools:
     own = xyz.take(order[places], axis=0)
     before = xyz.take(order[places - 1], axis=0)
     x, y, z = (own != before).T
-    result: Bools = x | y | z
-    return result
+    return np.asarray(x | y | z)
 
 
 def _ascending(code: NDArray[np.uint64]) -> Ints:

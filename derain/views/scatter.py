@@ -41,5 +41,4 @@ def scatter_through_space(xyz: Floats, neighbours: Ints) -> Floats:
 
 def _about_their_mean(values: Floats) -> Floats:
     """The values of each column less their mean, float64 (k, Q)."""
-    about: Floats = values - values.mean(axis=0)
-    return about
+    return np.asarray(values - values.mean(axis=0))
