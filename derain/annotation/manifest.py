@@ -95,9 +95,8 @@ class Manifest:
         """
         path = root / TAUGHT_MANIFEST
         if not is_file(path):
-            raise InputError(
-                root, f"has no {TAUGHT_MANIFEST}", "Give a folder that `derain teach` wrote."
-            )
+            remedy = "Give a folder that `derain teach` wrote."
+            raise InputError(root, f"has no {TAUGHT_MANIFEST}", remedy)
         entry = Entry.of_yaml(path, LARGEST_TAUGHT)
         if not (isinstance(entry.value, dict) and entry.value.get("made_by") == TEACHING):
             raise entry.fault("`derain teach` did not write it", "Give a folder that it wrote.")

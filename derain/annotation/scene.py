@@ -202,11 +202,9 @@ def read_scene(path: Path) -> Scene:
     for sequence, corrections in scene.corrections.items():
         for name in corrections:
             if name not in scene.boxes:
-                raise InputError(
-                    f"{path}: corrections.{sequence}.boxes.{name}",
-                    "there is no such box",
-                    f"Available: {', '.join(scene.boxes)}.",
-                )
+                place = f"{path}: corrections.{sequence}.boxes.{name}"
+                remedy = f"Available: {', '.join(scene.boxes)}."
+                raise InputError(place, "there is no such box", remedy)
     return scene
 
 

@@ -245,11 +245,9 @@ def _finish(work: Labelling, out: Path, known: Sequence[Frame]) -> Manifest:
     """
     frames = [frame for frame in known if isinstance(frame, FileFrame)]  # all are in files
     if not frames:
-        raise InputError(
-            out,
-            "nothing is written, because in every scan the method fails or is sure of no point",
-            "Check that the method suits the scans: some need several scans of one recording.",
-        )
+        reason = "nothing is written, because in every scan the method fails or is sure of no point"
+        remedy = "Check that the method suits the scans: some need several scans of one recording."
+        raise InputError(out, reason, remedy)
     manifest = Manifest(
         work.method.as_dict(),
         [
@@ -296,9 +294,8 @@ def refuse_to_overwrite(out: Path, source: Source) -> None:
     """
     for frame in source:
         if not isinstance(frame, FileFrame):
-            raise InputError(
-                frame.name, "is not in a file, and cannot be found again", "Write it to one."
-            )
+            reason = "is not in a file, and cannot be found again"
+            raise InputError(frame.name, reason, "Write it to one.")
     # Refuses the places where the scans' own labels are or would be searched for.
     for sink in (FolderSink(out / LABELS, again=False), LabelSink(out / LABELS, again=False)):
         sink.refuse_clashes(source)
@@ -306,11 +303,8 @@ def refuse_to_overwrite(out: Path, source: Source) -> None:
         return
     for name in (TAUGHT_MANIFEST, CARD, LABELS):
         if os.path.lexists(out / name):
-            raise InputError(
-                out / name,
-                "exists, and `derain teach` did not write it",
-                "Give --out another folder.",
-            )
+            reason = "exists, and `derain teach` did not write it"
+            raise InputError(out / name, reason, "Give --out another folder.")
 
 
 def _put_in_place(folder: Path, out: Path, manifest: Manifest, card: DataCard | None) -> None:

@@ -117,11 +117,8 @@ class CRF(PointFilter):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.variant == "fitted" and self.neighbours < FEWEST_NEIGHBOURS:
-            raise InputError(
-                self.name,
-                f"neighbours is {self.neighbours}, and so few points always lie in a plane",
-                f"Give {FEWEST_NEIGHBOURS} or more.",
-            )
+            reason = f"neighbours is {self.neighbours}, and so few points always lie in a plane"
+            raise InputError(self.name, reason, f"Give {FEWEST_NEIGHBOURS} or more.")
 
     def judge(self, view: Neighbourhoods) -> Bools:
         """Returns which points are rain; see :class:`PointFilter`."""

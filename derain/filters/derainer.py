@@ -48,9 +48,8 @@ class FilterDerainer(Method):
         self, filter: PointFilter, threads: int = 0, candidates: Candidates | None = None
     ) -> None:
         if not isinstance(filter, PointFilter):
-            raise InputError(
-                "filter", f"{filter!r} is no filter", "Give one, such as derain.DROR()."
-            )
+            remedy = "Give one, such as derain.DROR()."
+            raise InputError("filter", f"{filter!r} is no filter", remedy)
         self.filter = filter
         self.threads = threads_of(threads)
         self.candidates = candidates

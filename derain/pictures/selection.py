@@ -55,11 +55,8 @@ class Selection:
 
     def __post_init__(self) -> None:
         if not self.numbers:
-            raise InputError(
-                "--frames",
-                f"none of them is among the {len(self.source):,} scans",
-                "They count from 0; leave it out to show all.",
-            )
+            reason = f"none of them is among the {len(self.source):,} scans"
+            raise InputError("--frames", reason, "They count from 0; leave it out to show all.")
 
     @cached_property
     def frames(self) -> list[Frame]:

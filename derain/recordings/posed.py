@@ -110,11 +110,8 @@ def _with_file_poses(source: Sequence[Frame], path: Path) -> Frames:
     with reading(path):
         folder = path.is_dir()
     if len(recordings) > 1 and not folder:
-        raise InputError(
-            path,
-            f"is one file of poses for {len(recordings):,} recordings",
-            "Name a folder with one for each, <sequence>.txt.",
-        )
+        reason = f"is one file of poses for {len(recordings):,} recordings"
+        raise InputError(path, reason, "Name a folder with one for each, <sequence>.txt.")
     posed: list[Frame] = []
     for recording in recordings:
         file = path / f"{recording[0].sequence}.txt" if folder else path

@@ -51,11 +51,8 @@ def fit_candidates(
         InputError: Another share.
     """
     if not LEAST_INSIDE <= inside < 1:
-        raise InputError(
-            "candidates",
-            f"{inside:g} is no share of the rain",
-            f"Give one from {LEAST_INSIDE:g} to below 1, such as {RAIN_INSIDE:g}.",
-        )
+        remedy = f"Give one from {LEAST_INSIDE:g} to below 1, such as {RAIN_INSIDE:g}."
+        raise InputError("candidates", f"{inside:g} is no share of the rain", remedy)
     names = bounded_channels(channels)
     values, rain = _gathered(scans, names)
     if not rain.any():

@@ -161,11 +161,9 @@ class RangeView(View):
 
     def __post_init__(self) -> None:
         if self.back_projection not in BACK_PROJECTIONS:
-            raise InputError(
-                "back_projection",
-                f"no such back-projection: '{self.back_projection}'",
-                f"Available: {', '.join(BACK_PROJECTIONS)}.",
-            )
+            reason = f"no such back-projection: '{self.back_projection}'"
+            remedy = f"Available: {', '.join(BACK_PROJECTIONS)}."
+            raise InputError("back_projection", reason, remedy)
 
     @classmethod
     def of(

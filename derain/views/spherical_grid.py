@@ -76,16 +76,12 @@ class SphericalGrid:
         if self.rows * self.columns > MOST_PIXELS:
             raise _wrong(size, f"Give at most {MOST_PIXELS:,} pixels.")
         if not (-FULL_CIRCLE <= right < left <= right + FULL_CIRCLE):
-            raise _wrong(
-                f"azimuth from {right:g} to {left:g} degrees",
-                "Give the right bound, then the left, at most 360 degrees apart.",
-            )
+            reason = f"azimuth from {right:g} to {left:g} degrees"
+            raise _wrong(reason, "Give the right bound, then the left, at most 360 degrees apart.")
         descending = all(above > below for above, below in itertools.pairwise(self.edges))
         if not (descending and self.edges[0] <= 90 and self.edges[-1] >= -90):
-            raise _wrong(
-                f"inclination from {self.edges[-1]:g} to {self.edges[0]:g} degrees",
-                "Rows must follow one another within -90 and 90.",
-            )
+            reason = f"inclination from {self.edges[-1]:g} to {self.edges[0]:g} degrees"
+            raise _wrong(reason, "Rows must follow one another within -90 and 90.")
 
     @classmethod
     def even(
@@ -227,11 +223,9 @@ def grid_at(entry: Entry) -> SphericalGrid:
     """
     if isinstance(entry.value, str):
         if entry.value not in PUBLISHED_GRIDS:
-            raise entry.fault(
-                f"there is no grid named {shown(entry.value)}",
-                f"Available: {', '.join(PUBLISHED_GRIDS)}; or describe one by columns, rows and "
-                "inclination.",
-            )
+            published = ", ".join(PUBLISHED_GRIDS)
+            remedy = f"Available: {published}; or describe one by columns, rows and inclination."
+            raise entry.fault(f"there is no grid named {shown(entry.value)}", remedy)
         entry = Entry(entry.source, entry.key, PUBLISHED_GRIDS[entry.value])
     parts = {"azimuth": ALL_AROUND, **entry.record(_PARSERS, required=("columns",))}
     columns, azimuth = parts.pop("columns"), parts.pop("azimuth")
@@ -245,10 +239,8 @@ def grid_at(entry: Entry) -> SphericalGrid:
                 return SphericalGrid(columns, azimuth, parts["edges"])
     except InputError as error:
         raise entry.fault(f"a grid of {error.reason}", error.remedy) from error
-    raise entry.fault(
-        f"its rows are described by {', '.join(parts) or 'nothing'}",
-        "Give rows with inclination, or beams, or edges.",
-    )
+    reason = f"its rows are described by {', '.join(parts) or 'nothing'}"
+    raise entry.fault(reason, "Give rows with inclination, or beams, or edges.")
 
 
 # What reads each part of a grid's description. No image has more rows or columns than pixels.

@@ -145,9 +145,8 @@ class View(ABC):
         Raises:
             InputError: A view that sees every point alike.
         """
-        raise InputError(
-            self.NAME, "the view cannot leave points out", "Use the model without candidates."
-        )
+        remedy = "Use the model without candidates."
+        raise InputError(self.NAME, "the view cannot leave points out", remedy)
 
     @abstractmethod
     def __call__(self, scan: Scan) -> ViewedScan:

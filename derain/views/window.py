@@ -26,9 +26,8 @@ class Window:
 
     def __post_init__(self) -> None:
         if min(self.before, self.after) < 0:
-            raise InputError(
-                "window", f"{self.before} scans before and {self.after} after", "Give 0 or more."
-            )
+            reason = f"{self.before} scans before and {self.after} after"
+            raise InputError("window", reason, "Give 0 or more.")
 
     @property
     def is_one_scan(self) -> bool:
