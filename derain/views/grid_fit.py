@@ -9,18 +9,9 @@ import numpy as np
 
 from derain.errors import InputError
 from derain.scan import Scan
+from derain.views import scan_pattern
 from derain.views.range_image import RangeView
-from derain.views.scan_pattern import (
-    FINEST_STEP,
-    REAL_GAP,
-    Extent,
-    ReturnAngles,
-    azimuth_extent,
-    azimuth_step,
-    find_beams,
-    inclination_extent,
-    inclination_step,
-)
+from derain.views.scan_pattern import Extent
 from derain.views.spherical_grid import ALL_AROUND, SphericalGrid
 
 # Networks halve an image four times; columns come in 64 for the processor's sake.
@@ -82,23 +73,23 @@ def fit_grid(scans: Sequence[Scan]) -> GridFit:
     Raises:
         InputError: Not one valid point.
     """
-    seen = [angles for scan in scans if len((angles := ReturnAngles.of(scan)).azimuth)]
+    seen = [angles for scan in scans if len((angles := scan_pattern.ReturnAngles.of(scan)).azimuth)]
     if not seen:
         raise InputError("grid", "there is no valid point to fit it to", "Give a grid by its name.")
     inclinations = np.concatenate([angles.inclination for angles in seen])
-    azimuth = azimuth_extent(np.concatenate([angles.azimuth for angles in seen]))
-    inclination = inclination_extent(inclinations)
+    azimuth = scan_pattern.azimuth_extent(np.concatenate([angles.azimuth for angles in seen]))
+    inclination = scan_pattern.inclination_extent(inclinations)
     returns = len(inclinations) / len(seen)
     some = seen[:: math.ceil(len(seen) / SCANS)]
-    beams = find_beams(some)
+    beams = scan_pattern.find_beams(some)
     if beams.size:
         edges = list(SphericalGrid.of_beams(beams.tolist(), columns=1).edges)
-        columns, bounds = _columns(azimuth, azimuth_step(some, edges[::-1]))
+        columns, bounds = _columns(azimuth, scan_pattern.azimuth_step(some, edges[::-1]))
     else:
-        step = azimuth_step(some, _thin_slabs(azimuth, inclination, returns))
+        step = scan_pattern.azimuth_step(some, _thin_slabs(azimuth, inclination, returns))
         columns, bounds = _columns(azimuth, step)
         most = PIXELS_PER_RETURN * returns / columns
-        edges = _even_edges(inclination, inclination_step(some, step), most)
+        edges = _even_edges(inclination, scan_pattern.inclination_step(some, step), most)
     # Outliers are worth no rows of their own, but the outermost rows reach out to them.
     edges[0] = max(edges[0], float(inclinations.max()))
     edges[-1] = min(edges[-1], float(inclinations.min()))
@@ -113,7 +104,7 @@ def _thin_slabs(azimuth: Extent, inclination: Extent, returns: float) -> list[fl
     """
     (right, left), (bottom, top) = azimuth, inclination
     thickness = math.sqrt((left - right) * (top - bottom) / returns) / 2
-    return np.arange(bottom, top, max(thickness, FINEST_STEP)).tolist()
+    return np.arange(bottom, top, max(thickness, scan_pattern.FINEST_STEP)).tolist()
 
 
 def _columns(azimuth: Extent, step: float) -> tuple[int, Extent]:
@@ -135,7 +126,7 @@ def _even_edges(inclination: Extent, step: float, most: float) -> list[float]:
 
 def _widened(extent: Extent, step: float) -> Extent:
     """From the middle of the outermost pixels to their borders."""
-    margin = min(step, REAL_GAP) / 2  # no step may close the gap that a sensor leaves
+    margin = min(step, scan_pattern.REAL_GAP) / 2  # no step may close the gap that a sensor leaves
     return extent[0] - margin, extent[1] + margin
 
 

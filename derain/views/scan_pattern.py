@@ -104,11 +104,9 @@ def find_beams(scans: Sequence[ReturnAngles]) -> Floats:
     """
     inclination = np.concatenate([scan.inclination for scan in scans])
     rows = [scan.row for scan in scans if scan.row is not None]
-    beams = (
-        _beams_of_rows(inclination, np.concatenate(rows))
-        if len(rows) == len(scans)
-        else np.zeros(0)
-    )
+    beams = np.zeros(0)
+    if len(rows) == len(scans):
+        beams = _beams_of_rows(inclination, np.concatenate(rows))
     return (beams if beams.size else _beams_of_clusters(np.sort(inclination)))[::-1]
 
 
