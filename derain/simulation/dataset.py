@@ -10,6 +10,7 @@ machines do not change a byte. If two runs use one folder, the second waits for 
 one run do not wait for each other.
 """
 
+import hashlib
 import os
 import shutil
 import sys
@@ -26,13 +27,7 @@ from derain.jobs.running import IsThere, Submits, Task, Value, ValueWork, values
 from derain.jobs.shard import Shard
 from derain.jobs.unit import Unit
 from derain.simulation.campaign import SplitSequences
-from derain.simulation.manifest import (
-    MANIFEST,
-    checksums,
-    parameters_of,
-    read_manifest,
-    write_manifest,
-)
+from derain.simulation.manifest import MANIFEST, parameters_of, read_manifest, write_manifest
 from derain.system.open3d_import import import_open3d
 
 SEQUENCES = "sequences"
@@ -122,11 +117,20 @@ class SequenceWork(ValueWork[Unit]):
                 except OSError:
                     if not folder.is_dir():  # else another process was quicker, with the same bytes
                         raise
-        return checksums(folder, self.root)
+        return _checksums(folder, self.root)
 
     def look(self) -> IsThere[Unit, Value]:
         """True if a sequence is there."""
         return lambda unit, values: (self.root / SEQUENCES / unit.id).is_dir()
+
+
+def _checksums(folder: Path, root: Path) -> dict[str, str]:
+    """SHA-256 of every file below a folder, by its path from the root, in ascending order."""
+    return {
+        file.relative_to(root).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
+        for file in sorted(folder.rglob("*"))
+        if file.is_file()
+    }
 
 
 def _remove(root: Path) -> None:

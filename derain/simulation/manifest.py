@@ -4,7 +4,6 @@ It is written twice: without ``files`` at the start, so that a resumed run recog
 and with ``files`` when every sequence is complete.
 """
 
-import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -105,12 +104,3 @@ def write_manifest(root: Path, content: Mapping[str, Any]) -> None:
         InputError: It cannot be written.
     """
     write_text(root / MANIFEST, json.dumps(content, indent=2) + "\n")
-
-
-def checksums(folder: Path, root: Path) -> dict[str, str]:
-    """SHA-256 of every file below a folder, by its path from the root, in ascending order."""
-    return {
-        file.relative_to(root).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
-        for file in sorted(folder.rglob("*"))
-        if file.is_file()
-    }

@@ -9,20 +9,19 @@ from numpy.random import Generator
 from derain.scan import Floats, Ints
 from derain.simulation.arrays import Columns
 from derain.simulation.classes import TrackClass
-from derain.simulation.rain_field import (
-    LARGEST_DROP,
-    RainField,
-    draw_diameters,
-    drops_per_cubic_metre,
-    extinction,
-    slope,
-)
+from derain.simulation.rain_field import INTERCEPT, RainField, extinction, slope
 from derain.simulation.sensor import Returns, Sensor
 
 # Fresnel reflectivity of water (refractive index 1.328 at 905 nm) at normal incidence. That a drop
 # returns as much as a surface of this reflectivity is a modelling choice.
 # Source: Kilic et al. 2021, "Lidar Light Scattering Augmentation (LISA)".
 DROP_REFLECTIVITY = ((1.328 - 1) / (1.328 + 1)) ** 2
+
+# Diameters drawn, millimetres. Smaller drops return too little to be seen one by one and count
+# through the extinction alone; larger ones break up as they fall.
+# Source: REHEARSE-3D, section III.E.
+SMALLEST_DROP = 0.5
+LARGEST_DROP = 6.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +37,21 @@ class Drops(Columns):
     beam: Ints
     range: Floats
     diameter: Floats
+
+
+def drops_per_cubic_metre(rate: float) -> float:
+    """Number of drops from SMALLEST_DROP to LARGEST_DROP in a cubic metre."""
+    steepness = float(slope(rate))
+    above_smallest = math.exp(-steepness * SMALLEST_DROP)
+    above_largest = math.exp(-steepness * LARGEST_DROP)
+    return INTERCEPT / steepness * (above_smallest - above_largest)
+
+
+def draw_diameters(rate: float, count: int, generator: Generator) -> Floats:
+    """Draws drop diameters, float64 (count,), millimetres: an exponential, cut at both ends."""
+    steepness = float(slope(rate))
+    span = -math.expm1(-steepness * (LARGEST_DROP - SMALLEST_DROP))
+    return SMALLEST_DROP - np.log1p(-span * generator.random(count)) / steepness
 
 
 def draw_drops(rate: float, reach: Floats, sensor: Sensor, generator: Generator) -> Drops:

@@ -1,11 +1,10 @@
-"""Rain: its rate over the ground, and number, sizes and extinction of its drops."""
+"""Rain: its rate over the ground, the sizes of its drops, its extinction, and its record."""
 
 import math
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.random import Generator
 from numpy.typing import ArrayLike
 
 from derain.errors import InputError
@@ -160,12 +159,6 @@ def _unknown_rate_error(rate: float) -> InputError:
 # Source: Marshall and Palmer 1948, "The distribution of raindrops with size".
 INTERCEPT = 8000.0
 
-# Diameters drawn, millimetres. Smaller drops return too little to be seen one by one and count
-# through the extinction alone; larger ones break up as they fall.
-# Source: REHEARSE-3D, section III.E.
-SMALLEST_DROP = 0.5
-LARGEST_DROP = 6.0
-
 # A drop much larger than the wavelength takes twice its cross-section out of the beam.
 # Source: the geometric limit of Mie scattering.
 EXTINCTION_EFFICIENCY = 2.0
@@ -191,16 +184,41 @@ def extinction(rate: ArrayLike) -> Floats:
     return 1e-6 * math.pi / 4 * EXTINCTION_EFFICIENCY * INTERCEPT * 2 / slope(rate) ** 3
 
 
-def drops_per_cubic_metre(rate: float) -> float:
-    """Number of drops from SMALLEST_DROP to LARGEST_DROP in a cubic metre."""
-    steepness = float(slope(rate))
-    above_smallest = math.exp(-steepness * SMALLEST_DROP)
-    above_largest = math.exp(-steepness * LARGEST_DROP)
-    return INTERCEPT / steepness * (above_smallest - above_largest)
+# Optical depth at which a black object cannot be distinguished from the horizon: −ln 0.02.
+# Source: Koschmieder 1924, with his contrast threshold of 2 %.
+VISIBLE_OPTICAL_DEPTH = 3.912
+
+# Half of the water of Marshall and Palmer's rain is in drops larger than this over Λ, the slope.
+# Source: Ulbrich 1983, "Natural variations in the analytical form of the raindrop size
+# distribution", for the exponential one.
+MEDIAN_VOLUME_DIAMETER = 3.67
 
 
-def draw_diameters(rate: float, count: int, generator: Generator) -> Floats:
-    """Draws drop diameters, float64 (count,), millimetres: an exponential, cut at both ends."""
-    steepness = float(slope(rate))
-    span = -math.expm1(-steepness * (LARGEST_DROP - SMALLEST_DROP))
-    return SMALLEST_DROP - np.log1p(-span * generator.random(count)) / steepness
+def weather_record(nominal: float, at_sensor: float, wind: tuple[float, float]) -> dict[str, float]:
+    """The record of a weather station and a disdrometer in some rain.
+
+    The drop spectrum N(D) = intercept · exp(−slope · D), the median diameter by volume and the
+    visibility are those of the nominal rate. Clear air has an infinite slope, drops of no diameter,
+    and no end to its visibility (``inf``). The wind's direction is where it blows to, from x
+    (ahead) towards y (left).
+
+    Args:
+        nominal: Nominal rain rate, mm/h.
+        at_sensor: Rain rate at the sensor's place, mm/h.
+        wind: Velocity towards x (ahead) and y (left), m/s.
+
+    Returns:
+        Values by names, in which the units are.
+    """
+    steepness = float(slope(nominal))
+    visibility = VISIBLE_OPTICAL_DEPTH / float(extinction(nominal)) if nominal else math.inf
+    return {
+        "rain_rate_mm_h": nominal,
+        "rain_rate_at_sensor_mm_h": at_sensor,
+        "drop_intercept_per_m3_mm": INTERCEPT,
+        "drop_slope_per_mm": steepness,
+        "median_volume_diameter_mm": MEDIAN_VOLUME_DIAMETER / steepness,
+        "wind_speed_m_s": math.hypot(*wind),
+        "wind_direction_deg": math.degrees(math.atan2(wind[1], wind[0])),
+        "visibility_m": visibility,
+    }

@@ -1,6 +1,5 @@
 """The scene of a sequence: its weather, and what a sensor sees of it in each scan."""
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import repeat
@@ -14,62 +13,16 @@ from derain.simulation.campaign import Campaign
 from derain.simulation.classes import packed
 from derain.simulation.layouts import LAYOUTS
 from derain.simulation.objects import Surface
-from derain.simulation.rain_field import (
-    INTERCEPT,
-    RainField,
-    SprinkledRain,
-    UniformRain,
-    extinction,
-    slope,
-)
+from derain.simulation.rain_field import RainField, SprinkledRain, UniformRain, weather_record
 from derain.simulation.sensor import Returns, Sensor
 from derain.simulation.shapes import Place
 from derain.simulation.street import Street, lay_out_street
 from derain.simulation.track import Track
 from derain.simulation.traffic import Course, MovingThing, draw_traffic
 
-# Optical depth at which a black object cannot be distinguished from the horizon: −ln 0.02.
-# Source: Koschmieder 1924, with his contrast threshold of 2 %.
-VISIBLE_OPTICAL_DEPTH = 3.912
-
-# Half of the water of Marshall and Palmer's rain is in drops larger than this over Λ, the slope.
-# Source: Ulbrich 1983, "Natural variations in the analytical form of the raindrop size
-# distribution", for the exponential one.
-MEDIAN_VOLUME_DIAMETER = 3.67
-
 # Strongest mean wind along each axis, m/s, a modelling choice: a light breeze, for in more the
 # facility's rain would not come down on its track.
 STRONGEST_WIND = 2.0
-
-
-def weather_record(nominal: float, at_sensor: float, wind: Place) -> dict[str, float]:
-    """The record of a weather station and a disdrometer in some rain.
-
-    The drop spectrum N(D) = intercept · exp(−slope · D), the median diameter by volume and the
-    visibility are those of the nominal rate. Clear air has an infinite slope, drops of no diameter,
-    and no end to its visibility (``inf``). The wind's direction is where it blows to, from x
-    (ahead) towards y (left).
-
-    Args:
-        nominal: Nominal rain rate, mm/h.
-        at_sensor: Rain rate at the sensor's place, mm/h.
-        wind: Velocity towards x (ahead) and y (left), m/s.
-
-    Returns:
-        Values by names, in which the units are.
-    """
-    steepness = float(slope(nominal))
-    visibility = VISIBLE_OPTICAL_DEPTH / float(extinction(nominal)) if nominal else math.inf
-    return {
-        "rain_rate_mm_h": nominal,
-        "rain_rate_at_sensor_mm_h": at_sensor,
-        "drop_intercept_per_m3_mm": INTERCEPT,
-        "drop_slope_per_mm": steepness,
-        "median_volume_diameter_mm": MEDIAN_VOLUME_DIAMETER / steepness,
-        "wind_speed_m_s": math.hypot(*wind),
-        "wind_direction_deg": math.degrees(math.atan2(wind[1], wind[0])),
-        "visibility_m": visibility,
-    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +32,7 @@ class SimulatedScene:
     Attributes:
         track: The track at rest.
         rain: The rain; it is the same wherever the sensor is.
-        weather: The record of it, see :func:`weather_record`.
+        weather: The record of it, see :func:`derain.simulation.rain_field.weather_record`.
         course: Motion of the sensor; None for a sensor at rest at the origin of the track.
         traffic: Other moving objects.
         skew: True if they move on while a scan is taken, see :class:`Drive`.

@@ -5,7 +5,7 @@ radar_pcd/000000.bin             a frame of the radar: float32 x, y, z (m), inte
 ext_radar/000000.csv             the same, with all that the radar measured
 lidar_radar_pcd/000000.bin       each scan, joined by the radar frame nearest in time
 lidar_radar_labels/000000.label  uint32 TrackClass per point of it
-weather/000000.csv               the weather during each scan, by scene.weather_record
+weather/000000.csv               the weather during each scan, by rain_field.weather_record
 extrinsics.yaml                  takes points of radar_pcd and ext_radar to the LiDAR's frame
 
 Each folder also holds metadata.csv: frame, timestamp (seconds from the start). Without a radar its

@@ -15,23 +15,23 @@ from derain.simulation import rain as rain_module
 from derain.simulation.classes import TrackClass
 from derain.simulation.rain import (
     DROP_REFLECTIVITY,
+    LARGEST_DROP,
+    SMALLEST_DROP,
     Drops,
     Transmission,
+    draw_diameters,
     draw_drops,
     drop_reflectivity,
+    drops_per_cubic_metre,
     farthest_visible_drop,
     rain_on_beams,
     thin_out,
 )
 from derain.simulation.rain_field import (
     INTERCEPT,
-    LARGEST_DROP,
-    SMALLEST_DROP,
     RainField,
     SprinkledRain,
     UniformRain,
-    draw_diameters,
-    drops_per_cubic_metre,
     extinction,
     slope,
 )

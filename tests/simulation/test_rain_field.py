@@ -7,15 +7,16 @@ import pytest
 
 from derain.errors import InputError
 from derain.simulation.radar import volume_reflectivity
+from derain.simulation.rain import drops_per_cubic_metre
 from derain.simulation.rain_field import (
     INTERCEPT,
     SprinkledRain,
     UniformRain,
-    drops_per_cubic_metre,
     extinction,
     slope,
+    weather_record,
 )
-from derain.simulation.scene import STRONGEST_WIND, draw_wind, weather_record
+from derain.simulation.scene import STRONGEST_WIND, draw_wind
 
 
 @pytest.mark.parametrize(
