@@ -8,7 +8,6 @@ import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import repeat
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -211,7 +210,7 @@ def _is_later(frame: Frame, other: Frame) -> bool:
 
 def _parts(scans: int) -> list[TaughtPart]:
     held_out = max(scans // ONE_IN, 1) if scans >= FEWEST_SCANS else 0
-    return [*repeat(TRAINING_PART, scans - held_out), *repeat(HELD_OUT_PART, held_out)]
+    return [TRAINING_PART] * (scans - held_out) + [HELD_OUT_PART] * held_out
 
 
 def _relative_path(home: Path, scan: Path) -> str:

@@ -48,8 +48,9 @@ class FilterDerainer(Method):
         self, filter: PointFilter, threads: int = 0, candidates: Candidates | None = None
     ) -> None:
         if not isinstance(filter, PointFilter):
-            remedy = "Give one, such as derain.DROR()."
-            raise InputError("filter", f"{filter!r} is no filter", remedy)
+            raise InputError(
+                "filter", f"{filter!r} is no filter", "Give one, such as derain.DROR()."
+            )
         self.filter = filter
         self.threads = threads_of(threads)
         self.candidates = candidates

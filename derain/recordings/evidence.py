@@ -110,13 +110,8 @@ def surroundings_features(points: ScanPoints) -> Floats:
     apart = np.log(steps_apart + STEP_EPSILON) - USUAL_STEPS
     rough = (np.log(scatter + FLATTEST) - USUAL_SCATTER) / SPREAD_OF_SCATTER
     far = np.log(points.rays.range / USUAL_RANGE)
-    return np.stack(
-        [
-            *(np.ones_like(apart), apart, rough, far),
-            *(apart**2, rough**2, far**2, apart * rough, apart * far, rough * far),
-        ],
-        axis=1,
-    )
+    products = apart**2, rough**2, far**2, apart * rough, apart * far, rough * far
+    return np.stack([np.ones_like(apart), apart, rough, far, *products], axis=1)
 
 
 def combined_log_odds(points: ScanPoints, evidence: RayEvidence | None) -> Floats:

@@ -159,11 +159,8 @@ def _by_row(
     scan: Scan, points: ScanPoints, log_odds: Floats, known: Bools, frame: Frame
 ) -> Judgement:
     """The judgement of the rows of a scan, by that of its points."""
-    judged = points.inverse >= 0
-    of_rows = points.inverse[judged]
-    probability = np.zeros(len(scan), np.float32)
-    rain, sure = np.zeros(len(scan), bool), np.zeros(len(scan), bool)
-    probability[judged] = (1 / (1 + np.exp(-log_odds[of_rows]))).astype(np.float32)
-    rain[judged] = log_odds[of_rows] > 0
-    sure[judged] = known[of_rows]
-    return Judgement(probability, rain, judged, scan, frame, sure)
+    # The last value is for rows that cannot be judged, whose point is -1.
+    log_odds = np.append(log_odds, -np.inf)[points.inverse]
+    sure = np.append(known, False)[points.inverse]
+    probability = (1 / (1 + np.exp(-log_odds))).astype(np.float32)
+    return Judgement(probability, log_odds > 0, points.inverse >= 0, scan, frame, sure)

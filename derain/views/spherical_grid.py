@@ -184,20 +184,13 @@ class SphericalGrid:
     def table(self) -> DirectionTable:
         """Finds the pixels of nearly all points, without trigonometry."""
         right, left = self.azimuth
-        return DirectionTable(
-            np.array(self.edges),
-            self._first_pixel,
-            np.linspace(left, right, self.columns + 1),
-            self._column,
-        )
+        borders = np.linspace(left, right, self.columns + 1)
+        return DirectionTable(np.array(self.edges), self._first_pixel, borders, self._column)
 
     def as_dict(self) -> dict[str, Any]:
         """The grid as JSON-able primitives, which :func:`grid_of` reads back."""
-        return {
-            "columns": self.columns,
-            "azimuth": list(self.azimuth),
-            "edges": list(self.edges),
-        }
+        azimuth, edges = list(self.azimuth), list(self.edges)
+        return {"columns": self.columns, "azimuth": azimuth, "edges": edges}
 
 
 def grid_of(config: str | Mapping[str, Any], source: str | Path) -> SphericalGrid:

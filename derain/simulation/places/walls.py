@@ -137,13 +137,10 @@ class Walls:
         """Draws walls by the spans of the length of the shorter side and of the longer one."""
         sides = [log_uniform(span, generator) for span in (shortest, longest)]
         along, across = (sides[which] for which in generator.permutation(2))
-        behind = np.clip(generator.uniform(0, along), 0.7, along - 0.7)
-        right = np.clip(generator.uniform(0, across), 0.7, across - 0.7)
-        return cls(
-            (-float(behind), float(along - behind)),
-            (-float(right), float(across - right)),
-            generator.uniform(2.3, 4.5),
-        )
+        behind = float(np.clip(generator.uniform(0, along), 0.7, along - 0.7))
+        right = float(np.clip(generator.uniform(0, across), 0.7, across - 0.7))
+        x, y = (-behind, along - behind), (-right, across - right)
+        return cls(x, y, generator.uniform(2.3, 4.5))
 
     @property
     def corners(self) -> list[tuple[float, float]]:
