@@ -100,19 +100,16 @@ class Manifest:
         if not (isinstance(entry.value, dict) and entry.value.get("made_by") == TEACHING):
             raise entry.fault("`derain teach` did not write it", "Give a folder that it wrote.")
         home = Path(os.path.realpath(root))
-        content = entry.record(
-            {
-                "made_by": Entry.text,
-                "derain": Entry.text,
-                "teacher": lambda item: item.each(lambda part: part.value),
-                "columns": Entry.texts,
-                "intensity_scale": lambda item: item.within(1 / LARGEST_SCALE, LARGEST_SCALE),
-                "finished": Entry.truth,
-                "scans": lambda item: tuple(_scan_of(part, home) for part in item.items()),
-            },
-            required=("teacher", "columns", "intensity_scale", "finished", "scans"),
-        )
-        manifest = cls(**{key: content[key] for key in content.keys() - {"made_by", "derain"}})
+        fields = {
+            "teacher": lambda item: item.each(lambda part: part.value),
+            "columns": Entry.texts,
+            "intensity_scale": lambda item: item.within(1 / LARGEST_SCALE, LARGEST_SCALE),
+            "finished": Entry.truth,
+            "scans": lambda item: tuple(_scan_of(part, home) for part in item.items()),
+        }
+        origin = {"made_by": Entry.text, "derain": Entry.text}
+        content = entry.record({**origin, **fields}, required=fields)
+        manifest = cls(**{key: content[key] for key in fields})
         if not manifest.finished:
             raise entry.fault("its labels are not complete", "Run the same `derain teach` again.")
         if len({scan.key for scan in manifest.scans}) < len(manifest.scans):

@@ -17,26 +17,11 @@ Parser = Callable[[Entry], Any]
 MOST = 2**31
 
 
-def is_share(value: float) -> bool:
-    """True if a number is within 0 and 1."""
-    return 0 <= value <= 1
-
-
-def is_positive(value: float) -> bool:
-    """True if a number is finite and above 0."""
-    return 0 < value < math.inf
-
-
-def is_positive_span(span: Span) -> bool:
-    """True if a span lies above 0, so that a number can be drawn evenly in its logarithm."""
-    low, high = span
-    return 0 < low <= high < math.inf
-
-
-# Types of settings, each with the rule that its values follow.
-Share = Annotated[float, is_share]
-Positive = Annotated[float, is_positive]
-LogSpan = Annotated[Span, is_positive_span]
+# Types of settings, each with the rule that its values follow: shares, finite numbers above 0, and
+# spans above 0, from which a number can be drawn evenly in its logarithm.
+Share = Annotated[float, lambda value: 0 <= value <= 1]
+Positive = Annotated[float, lambda value: 0 < value < math.inf]
+LogSpan = Annotated[Span, lambda span: 0 < span[0] <= span[1] < math.inf]
 
 
 def weights_of(*names: str) -> Parser:

@@ -1,6 +1,6 @@
 """Candidates: bounds outside which no point is rain, so that none is searched there."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -113,7 +113,8 @@ def candidates_at(entry: Entry) -> Candidates | None:
     """
     if entry.value is None:
         return None
-    return Candidates(**entry.record(_PARSERS, required=("bounds",)))
+    shares = dict.fromkeys(("points", "rain", "rain_share"), lambda entry: entry.within(0, 1))
+    return Candidates(**entry.record({"bounds": _bounds, **shares}, required=("bounds",)))
 
 
 def bounded_channels(channels: Sequence[str]) -> tuple[str, ...]:
@@ -137,7 +138,8 @@ def _bounds(entry: Entry) -> tuple[Bound, ...]:
 
 
 def _bound(entry: Entry) -> Bound:
-    bound = Bound(**entry.record(_BOUND_PARSERS, required=("channel",)))
+    parsers = {"channel": Entry.text, "least": _number_or_none, "most": _number_or_none}
+    bound = Bound(**entry.record(parsers, required=("channel",)))
     if bound.least is None is bound.most:
         raise entry.fault("it has neither least nor most", "Write one of them.")
     if bound.least is not None and bound.most is not None and bound.least > bound.most:
@@ -147,15 +149,3 @@ def _bound(entry: Entry) -> Bound:
 
 def _number_or_none(entry: Entry) -> float | None:
     return None if entry.value is None else entry.within(-LARGEST_FLOAT32, LARGEST_FLOAT32)
-
-
-_BOUND_PARSERS: dict[str, Callable[[Entry], Any]] = {
-    "channel": Entry.text,
-    "least": _number_or_none,
-    "most": _number_or_none,
-}
-
-_PARSERS: dict[str, Callable[[Entry], Any]] = {
-    "bounds": _bounds,
-    **dict.fromkeys(("points", "rain", "rain_share"), lambda entry: entry.within(0, 1)),
-}

@@ -176,10 +176,8 @@ class RangeView(View):
         Raises:
             InputError: Something that does not describe it.
         """
-        found = entry.record(
-            {"kind": Entry.text, "grid": grid_at, "way_back": Entry.text},
-            required=("grid", "way_back"),
-        )
+        parsers = {"kind": Entry.text, "grid": grid_at, "way_back": Entry.text}
+        found = entry.record(parsers, required=("grid", "way_back"))
         return cls(found["grid"], channels, found["way_back"], fill_value)
 
     def as_dict(self) -> dict[str, Any]:

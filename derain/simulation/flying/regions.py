@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.random import Generator
@@ -18,21 +17,6 @@ GUST_WAVES = 12
 
 # Share of the densest that is left between sheets and filaments, a modelling choice.
 THINNEST = 0.05
-
-
-class Region(Protocol):
-    """A part of space with a density of particles."""
-
-    def stretch(self, beams: Floats, stretch: Stretch) -> Stretch:
-        """The part of each beam's stretch that the region has, at least.
-
-        Args:
-            beams: Unit vectors, float64 (N, 3), sensor frame.
-            stretch: The part of the beams in front of the surfaces.
-        """
-
-    def density(self, place: Floats) -> Floats:
-        """Density over the greatest, float64 (N,), in 0..1, at places, float64 (N, 3), metres."""
 
 
 class Gusts:
@@ -62,11 +46,16 @@ class Gusts:
         self._form, self._contrast = form, contrast
 
     def stretch(self, beams: Floats, stretch: Stretch) -> Stretch:
-        """All of the beams."""
+        """The part of each beam's stretch that the region has, at least: all of it.
+
+        Args:
+            beams: Unit vectors, float64 (N, 3), sensor frame.
+            stretch: The part of the beams in front of the surfaces.
+        """
         return stretch
 
     def density(self, place: Floats) -> Floats:
-        """That of the random fields."""
+        """Density over the greatest, float64 (N,), in 0..1, at places, float64 (N, 3), metres."""
         match self._form:
             case "even":
                 return np.ones(len(place))
@@ -179,6 +168,10 @@ class Plume:
 
     def _half_width(self, along: Floats | float) -> Floats:
         return np.asarray(PLUME_HALF_WIDTH + PLUME_OPENING * along)
+
+
+# A part of space with a density of particles.
+Region = Gusts | GroundLayer | Plume
 
 
 def draw_plumes(
