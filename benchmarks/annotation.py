@@ -13,7 +13,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from benchmarks.track_scene import scene_of_track
@@ -22,7 +21,7 @@ from derain.annotation.steps import Plane, annotate, road_plane
 from derain.evaluation.counts import intersection_over_union
 from derain.evaluation.text_tables import markdown_table
 from derain.fusion import UNKNOWN
-from derain.scan import Scan
+from derain.scan import Floats, Ints, Scan
 from derain.simulation.classes import TrackClass
 from derain.simulation.facility import lay_out_facility
 from derain.simulation.rain import rain_on_beams
@@ -65,7 +64,7 @@ def sequences(tracks: int, scans: int) -> Iterator[tuple[float, list[Scan], dict
 class Findings:
     """Counts of labelling: points by class (rows) and label (columns), and reasons of errors."""
 
-    table: NDArray[np.int64] = field(default_factory=lambda: np.zeros((KINDS, KINDS), np.int64))
+    table: Ints = field(default_factory=lambda: np.zeros((KINDS, KINDS), np.int64))
     reasons: Counter[str] = field(default_factory=Counter)
 
     def add(self, scan: Scan, scene: Scene, plane: Plane) -> None:
@@ -83,14 +82,14 @@ class Findings:
         return float(self.table.trace() / self.table.sum())
 
     @property
-    def iou(self) -> NDArray[np.float64]:
+    def iou(self) -> Floats:
         """Intersection over union of each class; NaN for one that does not occur."""
         hits = self.table.diagonal()
         errors = self.table.sum(axis=0) + self.table.sum(axis=1) - 2 * hits
         return intersection_over_union(hits, errors)
 
 
-def _reasons(scan: Scan, label: NDArray[np.int64], scene: Scene, plane: Plane) -> dict[str, int]:
+def _reasons(scan: Scan, label: Ints, scene: Scene, plane: Plane) -> dict[str, int]:
     """Reasons of wrong labels: for each point the first reason that holds."""
     assert scan.label is not None
     points = scan.xyz.astype(np.float64)

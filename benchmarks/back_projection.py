@@ -14,12 +14,11 @@ from pathlib import Path
 
 import numpy as np
 from labelled import read_labelled
-from numpy.typing import NDArray
 
 from derain.cards.card import load_card
 from derain.evaluation.counts import Counts
 from derain.evaluation.text_tables import markdown_table
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.system.stopwatch import Stopwatch
 from derain.views.back_projection import BACK_PROJECTIONS
 from derain.views.grid_fit import fit_grid
@@ -39,7 +38,7 @@ class GridCounts:
     view: list[float] = field(default_factory=list)
     back: list[float] = field(default_factory=list)
 
-    def add(self, view: RangeView, scan: Scan, rain: NDArray[np.bool_]) -> None:
+    def add(self, view: RangeView, scan: Scan, rain: Bools) -> None:
         """Views a scan, labels its pixels perfectly and takes the labels back."""
         stopwatch = Stopwatch()
         with stopwatch.stage("view"):

@@ -35,6 +35,7 @@ from benchmarks.recorded_bags import (
 from benchmarks.turns import milliseconds_in_turns
 from derain.cli.main import main as derain
 from derain.files import read_scan
+from derain.scan import Bools
 from derain.sources.folders import named_frames
 
 
@@ -77,7 +78,7 @@ def _run(method: str, scans: Sequence[Path], out: Path) -> None:
         sys.exit(f"derain {' '.join(command)} failed")
 
 
-def _prove(storage: Storage, bag: Path, made: Path, masks: Sequence[NDArray[np.bool_]]) -> bool:
+def _prove(storage: Storage, bag: Path, made: Path, masks: Sequence[Bools]) -> bool:
     """Compares a bag with its cleaned copy, by the library alone, and returns the differences."""
     before, after = read_bag(bag), read_bag(made)
     others = [(old, new) for old, new in zip(before, after, strict=False) if old[0] != POINTS]

@@ -16,12 +16,12 @@ from itertools import combinations_with_replacement
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from torch import Tensor
 
 from derain.cards.card import DataCard, load_card
 from derain.evaluation.text_tables import markdown_table
 from derain.models.published import read_state_dict
+from derain.scan import Floats
 
 INTENSITY = 3
 
@@ -63,9 +63,7 @@ def remembered_intensity(
     return float(offset + scale * mean[INTENSITY]), float(scale * np.sqrt(shared + own))
 
 
-def _relative_least_squares(
-    columns: NDArray[np.float64], values: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _relative_least_squares(columns: Floats, values: Floats) -> Floats:
     """The least squares of relative errors: variances differ by a factor of twenty."""
     solution = np.linalg.lstsq(columns / values[:, None], np.ones(len(values)), rcond=None)[0]
     return np.asarray(solution)

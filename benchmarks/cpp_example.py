@@ -16,15 +16,15 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.export.runtime import Derainer
+from derain.scan import Bools, Floats
 from derain.system.stopwatch import Stopwatch
 
 STAGES = ("view", "network", "back")
 PRINTED = re.compile("rain, " + ", ".join(rf"{stage} ([\d.]+) ms" for stage in STAGES))
 
-Times = NDArray[np.float64]  # (scans, stages), milliseconds
+Times = Floats  # (scans, stages), milliseconds
 
 
 def main() -> None:
@@ -65,7 +65,7 @@ def compare(model: Path | None, arguments: argparse.Namespace) -> None:
     print(f"C++ takes {totals['C++'] / totals['derain']:.2f} of the time of derain")
 
 
-def by_program(model: Path, arguments: argparse.Namespace) -> tuple[list[NDArray[np.bool_]], Times]:
+def by_program(model: Path, arguments: argparse.Namespace) -> tuple[list[Bools], Times]:
     """The rain found by the program, and its times."""
     scans: list[Path] = arguments.scans
     with tempfile.TemporaryDirectory() as out:
@@ -78,7 +78,7 @@ def by_program(model: Path, arguments: argparse.Namespace) -> tuple[list[NDArray
     return labels, taken[len(scans) :]
 
 
-def by_derain(derainer: Derainer, scans: list[Path]) -> tuple[list[NDArray[np.bool_]], Times]:
+def by_derain(derainer: Derainer, scans: list[Path]) -> tuple[list[Bools], Times]:
     """The rain found by derain, and its times."""
     masks, taken = [], []
     for scan in (*scans, *scans):

@@ -15,7 +15,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.across_sensors import PLAN
 from benchmarks.sensor_table.inputs import DataFinder
@@ -28,7 +27,7 @@ from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.models.checkpoint import load_model
 from derain.models.cues import CueFusion
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 
 # Models by how often they weigh brightness.
 TITLES = ("geometry alone", "brightness weighed once", "twice: the model")
@@ -75,7 +74,7 @@ def _with_rounds(rounds: int) -> Derainer:
     return derainer
 
 
-def _without_intensity(derainer: Derainer, scan: Scan) -> NDArray[np.bool_]:
+def _without_intensity(derainer: Derainer, scan: Scan) -> Bools:
     return derainer(replace(scan, intensity=None))
 
 

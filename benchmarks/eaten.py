@@ -16,7 +16,6 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 from derain.cards.card import DataCard, load_card
 from derain.datamodules.base import Loading
@@ -27,7 +26,7 @@ from derain.evaluation.text_tables import markdown_table, number_text
 from derain.export.methods import load_method, named_method
 from derain.export.runtime import Derainer
 from derain.filters import FilterDerainer
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.sources.judging import judgements
@@ -51,7 +50,7 @@ class Eaten:
     of_class: Counter[int] = field(default_factory=Counter)
     taken: Counter[int] = field(default_factory=Counter)
 
-    def add(self, called: NDArray[np.bool_], scan: Scan, card: DataCard) -> None:
+    def add(self, called: Bools, scan: Scan, card: DataCard) -> None:
         """Counts a labelled scan, whose points that nobody knows are left out."""
         rows = distinct_rows(scan)[0] if card.deduplicate else np.flatnonzero(scan.valid)
         rows = rows[~card.unknown_of(scan)[rows]]

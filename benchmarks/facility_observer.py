@@ -33,10 +33,10 @@ from derain.evaluation.text_tables import markdown_table, number_text
 from derain.files import read_scan
 from derain.models.outdet import OutDet
 from derain.models.published import read_state_dict
-from derain.scan import Scan
+from derain.scan import Bools, Floats, Scan
 from derain.views.probability import probability_of_rain
 
-Method = Callable[[Scan], NDArray[np.bool_]]
+Method = Callable[[Scan], Bools]
 
 CARD = load_card("simulated")
 
@@ -53,7 +53,7 @@ class Example(NamedTuple):
 
     scan: Scan
     lidar_points: int
-    rain: NDArray[np.bool_]
+    rain: Bools
     rate: float
 
 
@@ -70,11 +70,11 @@ def published_network(weights: Path) -> Method:
     model = OutDet.from_published(read_state_dict(weights), card).eval()
     view = model.spec.make_view()
 
-    def judge(scan: Scan) -> NDArray[np.bool_]:
+    def judge(scan: Scan) -> Bools:
         seen = view(scan)
         with torch.inference_mode():
             logits = model(**{name: torch.from_numpy(a) for name, a in seen.inputs().items()})
-        rain: NDArray[np.bool_] = seen.back(probability_of_rain(logits.numpy())) > 0.5
+        rain: Bools = seen.back(probability_of_rain(logits.numpy())) > 0.5
         return rain
 
     return judge
@@ -111,7 +111,7 @@ def _examples(data: Simulated, root: Path) -> Iterator[Example]:
         yield Example(scan, len(read_scan(alone)), CARD.rain_of(scan), rates[frame.sequence])
 
 
-def _truths(data: Simulated) -> Iterator[tuple[Scan, NDArray[np.bool_]]]:
+def _truths(data: Simulated) -> Iterator[tuple[Scan, Bools]]:
     for frame in data.frames("train"):
         scan = data.read(frame)
         yield scan, CARD.rain_of(scan)
@@ -224,7 +224,7 @@ def _drawn_anew(scan: Scan, generator: np.random.Generator) -> Scan:
     return _with(scan, values[cube.ravel()])
 
 
-def _with(scan: Scan, intensity: NDArray[np.float64]) -> Scan:
+def _with(scan: Scan, intensity: Floats) -> Scan:
     return replace(scan, intensity=intensity.astype(np.float32))
 
 

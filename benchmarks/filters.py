@@ -13,19 +13,18 @@ from pathlib import Path
 
 import numpy as np
 from libraries import installed
-from numpy.typing import NDArray
 from turns import milliseconds_in_turns
 
 from derain.errors import InputError
 from derain.export.timing import versions
 from derain.files import read_scan
 from derain.filters import CRF, DROR, DSOR, ROR, SOR, SSR, FilterDerainer, PointFilter
-from derain.scan import Scan
+from derain.scan import Bools, Floats, Scan
 from derain.system.open3d_import import import_open3d
 
 ROUNDS = 9
 
-Method = Callable[[], NDArray[np.bool_]]
+Method = Callable[[], Bools]
 
 
 def main() -> None:
@@ -51,7 +50,7 @@ def main() -> None:
     print(versions())
 
 
-def _dror(xyz: NDArray[np.float64], threads: int) -> dict[str, Method]:
+def _dror(xyz: Floats, threads: int) -> dict[str, Method]:
     """DROR with searches by radius."""
     radius, enough = DROR().radius_at(xyz), DROR().neighbours
     rivals: dict[str, Method] = {}
@@ -67,11 +66,11 @@ def _dror(xyz: NDArray[np.float64], threads: int) -> dict[str, Method]:
     return rivals
 
 
-def _dsor(xyz: NDArray[np.float64], threads: int) -> dict[str, Method]:
+def _dsor(xyz: Floats, threads: int) -> dict[str, Method]:
     """DSOR with searches for nearest neighbours."""
     dsor = DSOR()
 
-    def judge(distances: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def judge(distances: Floats) -> Bools:
         mean = distances[:, 1:].mean(axis=1)
         usual = mean.mean() + dsor.deviation_multiplier * mean.std(ddof=1)
         return mean >= usual * dsor.range_multiplier * np.linalg.norm(xyz, axis=1)
@@ -88,13 +87,13 @@ def _dsor(xyz: NDArray[np.float64], threads: int) -> dict[str, Method]:
     return rivals
 
 
-def _ror(xyz: NDArray[np.float64]) -> dict[str, Method]:
+def _ror(xyz: Floats) -> dict[str, Method]:
     return _of_open3d(
         xyz, lambda cloud: cloud.remove_radius_outlier(ROR().neighbours - 1, ROR().radius)
     )
 
 
-def _sor(xyz: NDArray[np.float64]) -> dict[str, Method]:
+def _sor(xyz: Floats) -> dict[str, Method]:
     sor = SOR()
     return _of_open3d(
         xyz,
@@ -103,7 +102,7 @@ def _sor(xyz: NDArray[np.float64]) -> dict[str, Method]:
 
 
 def _of_open3d(
-    xyz: NDArray[np.float64], remove: Callable[[object], tuple[object, list[int]]]
+    xyz: Floats, remove: Callable[[object], tuple[object, list[int]]]
 ) -> dict[str, Method]:
     """Open3D's own filter, on every core of the machine."""
     try:
@@ -111,7 +110,7 @@ def _of_open3d(
     except InputError:
         return {}
 
-    def removed() -> NDArray[np.bool_]:
+    def removed() -> Bools:
         cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(xyz))
         _, kept = remove(cloud)
         rain = np.ones(len(xyz), bool)

@@ -22,7 +22,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.processes import DERAIN
 from derain.cards.card import load_card
@@ -33,7 +32,7 @@ from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.models.checkpoint import load_model, save_model
 from derain.models.cues import CueFusion
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.sources.folders import named_frames
 
 CONFIGURATION = "cues_worlds.yaml"
@@ -126,7 +125,7 @@ def chosen(iou: Mapping[float, float], taken: Mapping[str, Mapping[float, float]
     return clean[0] if clean else possible[-1]
 
 
-def _held_out(worlds: Path) -> Iterator[tuple[Scan, NDArray[np.bool_]]]:
+def _held_out(worlds: Path) -> Iterator[tuple[Scan, Bools]]:
     for folder in sorted(worlds.iterdir()):
         data = Worlds(str(folder), make=False)
         for frame in data.source("validation"):
@@ -134,9 +133,7 @@ def _held_out(worlds: Path) -> Iterator[tuple[Scan, NDArray[np.bool_]]]:
             yield scan, data.card.rain_of(scan)
 
 
-def _on_worlds(
-    derainer: Derainer, labelled: Iterator[tuple[Scan, NDArray[np.bool_]]]
-) -> dict[float, float]:
+def _on_worlds(derainer: Derainer, labelled: Iterator[tuple[Scan, Bools]]) -> dict[float, float]:
     """IoU of all scans together, by threshold."""
     hit, either = (np.zeros(len(THRESHOLDS)) for _ in range(2))
     for scan, rain in labelled:

@@ -6,9 +6,7 @@ docs/methods/index.md has the commands that make the scan and the networks.
 import argparse
 from pathlib import Path
 
-import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 from PIL import Image
 
 from derain.cards.card import load_card
@@ -16,7 +14,7 @@ from derain.evaluation.counts import Counts
 from derain.export.methods import load_method
 from derain.pictures.palette import outcomes
 from derain.pictures.scan_pictures import draw_columns, explain_colours
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.sources.folders import named_frames
 from derain.sources.source import Source
 
@@ -50,7 +48,7 @@ def main() -> None:
         write(labelled, predicted, card.rain_of(labelled), arguments.out / f"{title or method}.png")
 
 
-def judged(name: str, frames: Source, number: int) -> NDArray[np.bool_]:
+def judged(name: str, frames: Source, number: int) -> Bools:
     """The rain that a method finds in one scan of a recording, bool (N,)."""
     method = load_method(name, {})
     judgements = [method.push(frame) for frame in frames]
@@ -58,7 +56,7 @@ def judged(name: str, frames: Source, number: int) -> NDArray[np.bool_]:
     return answered[number].rain
 
 
-def write(scan: Scan, predicted: NDArray[np.bool_], rain: NDArray[np.bool_], path: Path) -> None:
+def write(scan: Scan, predicted: Bools, rain: Bools, path: Path) -> None:
     """Draws a scan from above and as the sensor sees it, coloured by the outcome of its points."""
     figure = Figure(figsize=(10, 4.4), layout="constrained")
     counts = Counts.of(predicted, rain)

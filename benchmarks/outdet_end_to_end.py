@@ -30,12 +30,12 @@ from derain.export.runtime import Derainer
 from derain.export.timing import versions
 from derain.models.outdet import OutDet
 from derain.models.published import read_state_dict
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 
 # Runs of each method in a round.
 WARM_UP, RUNS = 2, 5
 
-Method = Callable[[NDArray[np.float32]], NDArray[np.bool_]]
+Method = Callable[[NDArray[np.float32]], Bools]
 
 
 def main() -> None:

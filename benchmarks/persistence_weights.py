@@ -31,6 +31,7 @@ from derain.export.recorded import DOUBTFUL
 from derain.export.runtime import Derainer
 from derain.recordings.evidence import ScanPoints, surroundings_features
 from derain.recordings.rays import RayEvidence, mean_evidence
+from derain.scan import Bools, Floats
 from derain.sources.frame import Frame
 from derain.sources.recordings import recordings_of
 from derain.system.cores import usable_cores
@@ -51,9 +52,9 @@ class Described:
 
     rays: RayEvidence
     rays_to_solid: RayEvidence
-    surroundings: NDArray[np.float64]
+    surroundings: Floats
     alone: NDArray[np.float32]
-    rain: NDArray[np.bool_]
+    rain: Bools
 
 
 def main() -> None:
@@ -96,10 +97,7 @@ def _described(roots: list[Path]) -> Iterator[Described]:
 
 
 def _evidence(
-    recording: list[Frame],
-    points: list[ScanPoints],
-    place: int,
-    drops: list[NDArray[np.bool_]] | None = None,
+    recording: list[Frame], points: list[ScanPoints], place: int, drops: list[Bools] | None = None
 ) -> RayEvidence:
     """The evidence of the rays of the scans before and after at the points of a scan."""
     own, found = points[place], []
@@ -110,7 +108,7 @@ def _evidence(
     return mean_evidence(found)
 
 
-def _columns(evidence: RayEvidence) -> NDArray[np.float64]:
+def _columns(evidence: RayEvidence) -> Floats:
     """One, what ends, and what goes through, float64 (M, 3)."""
     return np.stack([np.ones_like(evidence.ending), evidence.ending, evidence.through], axis=1)
 
@@ -126,7 +124,7 @@ def _added(scans: list[Described]) -> tuple[float, ...]:
     alone = alone.clip(1e-9, 1 - 1e-9)
     before = np.log(alone / (1 - alone))
 
-    def loss(weights: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    def loss(weights: Floats) -> tuple[float, Floats]:
         log_odds = before + columns @ weights
         error = weight * (1 / (1 + np.exp(-log_odds)) - rain)
         of_points = np.logaddexp(0, log_odds) - rain * log_odds
@@ -135,15 +133,13 @@ def _added(scans: list[Described]) -> tuple[float, ...]:
     return tuple(float(round(each, 2)) for each in minimize(loss, np.zeros(2), jac=True).x)
 
 
-def _pose(frame: Frame) -> NDArray[np.float64]:
+def _pose(frame: Frame) -> Floats:
     pose = frame.pose
     assert pose is not None  # simulated drives have poses
     return pose
 
 
-def _fitted(
-    evidence: NDArray[np.float64], rain: NDArray[np.bool_], weight: NDArray[np.float64]
-) -> tuple[float, ...]:
+def _fitted(evidence: Floats, rain: Bools, weight: Floats) -> tuple[float, ...]:
     """Weights of a logistic regression, of which the first column is the constant."""
     model = LogisticRegression(fit_intercept=False, max_iter=1000).fit(evidence, rain, weight)
     return tuple(float(round(each, 2)) for each in model.coef_[0])

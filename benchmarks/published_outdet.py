@@ -14,6 +14,8 @@ from sklearn.neighbors import KDTree
 from torch import Tensor
 from torch.nn import functional
 
+from derain.scan import Bools
+
 NEIGHBOURS = 9
 
 
@@ -39,7 +41,7 @@ class PublishedPipeline:
         self.std = np.array(std)
         self.leaf_size = leaf_size
 
-    def __call__(self, points: NDArray[np.float32]) -> NDArray[np.bool_]:
+    def __call__(self, points: NDArray[np.float32]) -> Bools:
         """Returns True for points, float32 (N, 4), that are rain, bool (N,)."""
         tree = KDTree(points[:, :3], leaf_size=self.leaf_size)
         distances, neighbours = tree.query(points[:, :3], k=NEIGHBOURS)

@@ -17,7 +17,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.special import logit
 
@@ -27,6 +26,7 @@ from derain.evaluation.text_tables import markdown_table
 from derain.export.runtime import Derainer
 from derain.files import read_scan
 from derain.files.labels import read_labels
+from derain.scan import Bools, Floats
 
 SIMULATED = {
     "streets, mems_256": "--layout street --sequences 9 --scans 1 --rain 10 25 50",
@@ -37,7 +37,7 @@ WITHIN = 1.0  # metres
 ADDED = np.arange(-3, 3.1, 0.5)
 
 # Log-odds by the model, whether a detection is near, and whether it is rain: of every LiDAR point.
-Points = tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]
+Points = tuple[Floats, Bools, Bools]
 
 
 def main() -> None:
@@ -91,7 +91,7 @@ def _best(points: Points, threshold: float, pairs: Iterable[tuple[float, float]]
     return f"{scores[here, elsewhere]:.4f} ({here:g}, {elsewhere:g})"
 
 
-def _iou(called: NDArray[np.bool_], rain: NDArray[np.bool_]) -> float:
+def _iou(called: Bools, rain: Bools) -> float:
     return np.count_nonzero(called & rain) / max(np.count_nonzero(called | rain), 1)
 
 

@@ -20,7 +20,7 @@ from derain.datamodules.user_changes import across, along
 from derain.evaluation.text_tables import markdown_table
 from derain.export.methods import load_method
 from derain.files import read_scan
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 
 SNOW = Path("data/wads/sample.bin")
 CLEAN = Path("data/clean/kitti_hdl64.bin")
@@ -48,7 +48,7 @@ def main() -> None:
     print(markdown_table(["scan", *methods], rows))
 
 
-def iou(called: NDArray[np.bool_], rain: NDArray[np.bool_]) -> float:
+def iou(called: Bools, rain: Bools) -> float:
     """Intersection over union of the called rain, bool (N,), and the true rain."""
     return float((called & rain).sum() / max((called | rain).sum(), 1))
 

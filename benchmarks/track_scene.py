@@ -4,10 +4,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.annotation.scene import Box, Polygon, Rectangle, Scene
 from derain.annotation.steps import Plane
+from derain.scan import Bools, Floats
 from derain.simulation.classes import TrackClass
 from derain.simulation.sensor import Sensor
 from derain.simulation.track import Track
@@ -62,7 +62,7 @@ def scene_of_track(track: Track, sensor: Sensor, beside: float = 0.0) -> Scene:
     return Scene(_polygon(road), boxes, _polygon(area) if beside else None)
 
 
-def rectangle_around(points: NDArray[np.float64]) -> Rectangle:
+def rectangle_around(points: Floats) -> Rectangle:
     """The rectangle of the shortest outline around points, float64 (N ≥ 1, 2), metres."""
     heading, span = 45.0, 45.0
     while span > FINEST_HEADING:
@@ -76,7 +76,7 @@ def rectangle_around(points: NDArray[np.float64]) -> Rectangle:
     return Rectangle((float(x), float(y)), (float(length), float(width)), heading)
 
 
-def _axes(heading: float) -> NDArray[np.float64]:
+def _axes(heading: float) -> Floats:
     """Directions ahead and left of a heading in degrees as columns, (2, 2)."""
     cosine, sine = np.cos(np.radians(heading)), np.sin(np.radians(heading))
     return np.array([[cosine, -sine], [sine, cosine]])
@@ -92,7 +92,7 @@ def _polygon(rectangle: Rectangle) -> Polygon:
     return tuple((float(x), float(y)) for x, y in rectangle.corners())
 
 
-def _plane_near(points: NDArray[np.float64]) -> Plane:
+def _plane_near(points: Floats) -> Plane:
     """The plane with the least vertical distances from points (N, 3)."""
     x, y, z = points.T
     (level, ahead, left), *_ = np.linalg.lstsq(np.column_stack([np.ones_like(x), x, y]), z)
@@ -100,16 +100,16 @@ def _plane_near(points: NDArray[np.float64]) -> Plane:
     return Plane((-ahead / length, -left / length, 1 / length), -level / length)
 
 
-def _rise_over(area: Rectangle, ground: Plane, triangles: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _rise_over(area: Rectangle, ground: Plane, triangles: Floats) -> Bools:
     """Which triangles (T, 3, 3) rise above the ground, and may reach into an area."""
     relative, reach = area.relative(triangles[..., :2]), np.array(area.size) / 2
     apart = (relative.min(axis=1) > reach) | (relative.max(axis=1) < -reach)
     height = ground.height(triangles.reshape(-1, 3)).reshape(-1, 3).max(axis=1)
-    rising: NDArray[np.bool_] = ~apart.any(axis=1) & (height > BOX_CLEARANCE)
+    rising: Bools = ~apart.any(axis=1) & (height > BOX_CLEARANCE)
     return rising
 
 
-def _connected(triangles: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+def _connected(triangles: Floats) -> list[Floats]:
     """Splits triangles (T, 3, 3) into those that share edges."""
     if not len(triangles):
         return []
@@ -121,7 +121,7 @@ def _connected(triangles: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     return _grouped(triangles, mesh.cluster_connected_triangles()[0])
 
 
-def _bushes(triangles: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+def _bushes(triangles: Floats) -> list[Floats]:
     """Splits triangles (T, 3, 3) into groups between which there is air."""
     if not len(triangles):
         return []
@@ -130,11 +130,11 @@ def _bushes(triangles: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     return _grouped(triangles, centres.cluster_dbscan(LEAF_GAP, min_points=1))
 
 
-def _grouped(triangles: NDArray[np.float64], group: Any) -> list[NDArray[np.float64]]:
+def _grouped(triangles: Floats, group: Any) -> list[Floats]:
     return [triangles[np.asarray(group) == number] for number in np.unique(group)]
 
 
-def _box(kind: TrackClass, corners: NDArray[np.float64], margin: float, road: Plane) -> Box:
+def _box(kind: TrackClass, corners: Floats, margin: float, road: Plane) -> Box:
     """A box around corners (N, 3), with a margin on every side but that of the road."""
     footprint = rectangle_around(corners[:, :2])
     x, y = footprint.centre

@@ -14,7 +14,6 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from benchmarks.turns import milliseconds_in_turns
@@ -25,7 +24,7 @@ from derain.export.runtime import Derainer
 from derain.files import read_scan
 from derain.files.labels import label_beside, read_labels, semantic
 from derain.filters import DROR, FilterDerainer
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.simulation.campaign import Campaign
 from derain.simulation.classes import TrackClass
 from derain.simulation.dataset import simulate_track
@@ -87,7 +86,7 @@ def main() -> None:
     )
 
 
-def _by_both(derainer: Derainer, scan: Scan, rain: NDArray[np.bool_]) -> ByBoth:
+def _by_both(derainer: Derainer, scan: Scan, rain: Bools) -> ByBoth:
     """Weather of a scan by its labels and by the model."""
     return ScanWeather.of(scan, rain), derainer.weather(scan)
 
@@ -112,7 +111,7 @@ def _rates(
     yield f"{Path(RAINED_ON[0]).name}, {RAINED_ON[1]}, simulated", pairs
 
 
-def _simulated(layout: str, sensor: str, rate: float) -> tuple[Scan, NDArray[np.bool_]]:
+def _simulated(layout: str, sensor: str, rate: float) -> tuple[Scan, Bools]:
     """A scan of one place at a rate, and its rain."""
     campaign = Campaign(1, 0, 0, scans=1, rain_rates=(rate,), sensor=sensor, layout=layout)
     with tempfile.TemporaryDirectory() as folder:
@@ -151,7 +150,7 @@ def _real(data: Path, derainer: Derainer) -> str:
     return f"{title}\n{plain_table(rows)}"
 
 
-def _labelled(path: Path, scan: Scan) -> NDArray[np.bool_] | None:
+def _labelled(path: Path, scan: Scan) -> Bools | None:
     """The rain or snow by the labels of a scan; None without any."""
     label = label_beside(path)
     if not label.is_file():

@@ -13,12 +13,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from derain.evaluation.text_tables import plain_table
 from derain.export.runtime import Derainer
-from derain.scan import Scan
+from derain.scan import Bools, Floats, Scan
 from derain.simulation.arrays import Returns
 from derain.simulation.classes import TrackClass
 from derain.simulation.layouts import LAYOUTS
@@ -63,7 +62,7 @@ def main() -> None:
     (arguments.out / "weather_truth.txt").write_text(f"{text}\n", "utf-8")
 
 
-def _together(off: NDArray[np.float64]) -> str:
+def _together(off: Floats) -> str:
     """How far each way is from the truth, and from place to place, by the logarithms of ratios."""
     by_place = off.reshape(len(SENSORS), len(PLACES), len(RATES), len(WAYS))
     spread = by_place.max(axis=1) - by_place.min(axis=1)
@@ -96,9 +95,7 @@ def _rows(sensor: Sensor, derainer: Derainer) -> Iterator[tuple[list[str], list[
             yield row, [metres / truth for metres in measured]
 
 
-def _recall(
-    by_model: NDArray[np.bool_], scan: Scan, rain: NDArray[np.bool_], near: int, far: int
-) -> str:
+def _recall(by_model: Bools, scan: Scan, rain: Bools, near: int, far: int) -> str:
     """Share of the drops from here to there that the model finds; "-" for few."""
     asked = rain & (scan.range >= near) & (scan.range < far)
     return f"{by_model[asked].mean():.0%}" if asked.sum() >= FEWEST_DROPS else "-"
@@ -110,9 +107,7 @@ def _nothing(count: int, sensor: Sensor) -> Returns:
     return Returns(np.full(count, sensor.maximum_range), 0.0 * none, none, np.arange(count))
 
 
-def _scan(
-    clear: Returns, beams: NDArray[np.float64], rate: float, sensor: Sensor
-) -> tuple[Scan, NDArray[np.bool_]]:
+def _scan(clear: Returns, beams: Floats, rate: float, sensor: Sensor) -> tuple[Scan, Bools]:
     """A sensor's scan in rain, and its rain."""
     generator = np.random.default_rng(2)
     returns = rain_on_beams(clear, beams, UniformRain(rate), sensor, generator)
@@ -120,7 +115,7 @@ def _scan(
     return scan, scan.label == TrackClass.RAIN
 
 
-def _visibility(scan: Scan, rain: NDArray[np.bool_], beams: int) -> tuple[float, float]:
+def _visibility(scan: Scan, rain: Bools, beams: int) -> tuple[float, float]:
     """Visibility of a scan, and with the rays that returned nothing, metres."""
     weather = ScanWeather.of(scan, rain)
     other, met = weather.ends.sum(axis=1)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.datamodules.user_changes import changed_as_by_users, in_sector
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.views.spherical_grid import ALL_AROUND, FULL_CIRCLE
 
 # How often rain alone is made brighter or darker, by up to e to this power; and how often that is
@@ -134,9 +134,7 @@ def _mirror(azimuth: float) -> NDArray[np.float32]:
     return np.array([[cosine, sine, 0], [sine, -cosine, 0], [0, 0, 1]], np.float32)
 
 
-def with_other_brightness(
-    scan: Scan, rain: NDArray[np.bool_], generator: np.random.Generator
-) -> Scan:
+def with_other_brightness(scan: Scan, rain: Bools, generator: np.random.Generator) -> Scan:
     """A scan whose intensities are made all alike, inverted, cut to a few levels, or other in rain.
 
     Args:
@@ -169,7 +167,7 @@ def _of_all(known: NDArray[np.float32], generator: np.random.Generator) -> NDArr
 
 
 def _with_other_rain(
-    intensity: NDArray[np.float32], rain: NDArray[np.bool_], generator: np.random.Generator
+    intensity: NDArray[np.float32], rain: Bools, generator: np.random.Generator
 ) -> NDArray[np.float32]:
     largest = intensity.max()
     factor = np.exp(generator.uniform(-STRONGEST, STRONGEST))

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
 from torch.utils.data import Dataset, DistributedSampler
 
 from derain.errors import InputError
 from derain.learning.seeds import Draw, generator_of
+from derain.scan import Ints
 
 
 class Pick(NamedTuple):
@@ -89,7 +89,7 @@ class Draws:
             before[number] += 1
         return picks
 
-    def _of_one(self, place: int, seed: int, epoch: int) -> NDArray[np.int64]:
+    def _of_one(self, place: int, seed: int, epoch: int) -> Ints:
         """Numbers of the scans of one data set that an epoch draws."""
         scans, drawn = self.scans[place], self.drawn[place]
         first, skipped = divmod(epoch * drawn, scans)

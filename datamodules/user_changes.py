@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.scan import Scan
+from derain.scan import Bools, Floats, Scan
 from derain.simulation.drawing import log_uniform
 from derain.views.spherical_grid import FULL_CIRCLE
 
@@ -111,7 +111,7 @@ ALL_CHANGES: dict[str, Callable[[Scan, np.random.Generator], Scan]] = {
 }
 
 
-def along(xyz: NDArray[np.float32], metres: NDArray[np.float64]) -> NDArray[np.float32]:
+def along(xyz: NDArray[np.float32], metres: Floats) -> NDArray[np.float32]:
     """Points moved along their rays, away from the sensor, float32 (N, 3).
 
     Args:
@@ -138,7 +138,7 @@ def across(
     return (xyz + aside * aside_by + np.cross(rays, aside) * up_by).astype(np.float32)
 
 
-def in_sector(scan: Scan, width: float, generator: np.random.Generator) -> NDArray[np.bool_]:
+def in_sector(scan: Scan, width: float, generator: np.random.Generator) -> Bools:
     """True for points in a sector around one of the valid points; at least one must be valid.
 
     Args:
@@ -155,13 +155,13 @@ def in_sector(scan: Scan, width: float, generator: np.random.Generator) -> NDArr
     return np.abs(off) <= width / 2
 
 
-def _rays(xyz: NDArray[np.float32]) -> NDArray[np.float64]:
+def _rays(xyz: NDArray[np.float32]) -> Floats:
     """Unit vectors from the sensor, float64 (N, 3)."""
     wide = xyz.astype(np.float64)
-    rays: NDArray[np.float64] = wide / np.linalg.norm(wide, axis=1, keepdims=True)
+    rays: Floats = wide / np.linalg.norm(wide, axis=1, keepdims=True)
     return rays
 
 
-def _of_enough(scan: Scan, kept: NDArray[np.bool_]) -> Scan:
+def _of_enough(scan: Scan, kept: Bools) -> Scan:
     """The kept points of a scan; all of it where those are too few."""
     return scan.take(kept) if kept.sum() >= FEWEST_POINTS else scan

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.extrinsics import Extrinsics
-from derain.scan import Scan
+from derain.scan import Floats, Ints, Scan
 from derain.system.cores import usable_cores
 from derain.views.morton import distinct_rows
 
@@ -30,9 +30,7 @@ MERGED_COLUMNS = ("x", "y", "z", "intensity", "radar")
 NO_DETECTIONS = Scan(np.zeros((0, 3), np.float32), name="no radar frame")
 
 
-def nearest_in_time(
-    times: NDArray[np.float64], among: NDArray[np.float64], within: float
-) -> NDArray[np.int64]:
+def nearest_in_time(times: Floats, among: Floats, within: float) -> Ints:
     """Finds for every time the nearest of others, such as a radar frame for each LiDAR frame.
 
     Of two that are equally near the earlier is taken, and of equal times the first row.
@@ -101,9 +99,7 @@ def fuse(
     return Scan(xyz, intensity, label, is_radar, columns, name=lidar.name)
 
 
-def transfer_labels(
-    labelled: Scan, xyz: NDArray[np.float32], within: float = LABEL_WITHIN
-) -> NDArray[np.int64]:
+def transfer_labels(labelled: Scan, xyz: NDArray[np.float32], within: float = LABEL_WITHIN) -> Ints:
     """Labels points by the nearest valid point of a labelled scan.
 
     Where several rows of the scan lie at one position, the label of the first of them counts.
@@ -151,7 +147,7 @@ def _intensity(scan: Scan) -> NDArray[np.float32]:
     return np.zeros(len(scan), np.float32) if scan.intensity is None else scan.intensity
 
 
-def _label(lidar: Scan, radar: Scan, within: float) -> NDArray[np.int64] | None:
+def _label(lidar: Scan, radar: Scan, within: float) -> Ints | None:
     if lidar.label is None:
         return None
     if radar.label is None:

@@ -25,7 +25,7 @@ FEWEST_ALIKE = 100
 # SemanticKITTI-style range images mark a cell without a return by -1 in every column.
 SENTINEL = -1.0
 
-# Arrays of any shape, which stands where they are described: float64, int64 and bool.
+# Types of arrays: of float64, int64 and bool. Docstrings give the shapes.
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
@@ -94,8 +94,8 @@ class Scan:
 
     xyz: NDArray[np.float32]
     intensity: NDArray[np.float32] | None = None
-    label: NDArray[np.int64] | None = None
-    radar: NDArray[np.bool_] | None = None
+    label: Ints | None = None
+    radar: Bools | None = None
     fields: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     shape: tuple[int, int] | None = None
     name: str = "scan"
@@ -191,7 +191,7 @@ class Scan:
         return None if alike else self.intensity
 
     @cached_property  # whatever looks at a scan needs it
-    def valid(self) -> NDArray[np.bool_]:
+    def valid(self) -> Bools:
         """True for the points that can be judged, bool (N,), read-only.
 
         Not valid: coordinates or intensity not finite or beyond any sensor's reach, points exactly
@@ -215,7 +215,7 @@ class Scan:
         return valid
 
     @cached_property
-    def lacks_intensity(self) -> NDArray[np.bool_]:
+    def lacks_intensity(self) -> Bools:
         """True for points that would be valid if their intensity was possible, bool (N,)."""
         if self.valid.all():
             return ~self.valid
@@ -350,7 +350,7 @@ def to_float32(array: NDArray[Any]) -> NDArray[np.float32]:
         return np.ascontiguousarray(array, dtype=np.float32)
 
 
-def class_ids(label: NDArray[Any]) -> NDArray[np.int64]:
+def class_ids(label: NDArray[Any]) -> Ints:
     """A copy of semantic class ids, int64 (N,); of uint32, as in label files, the low 16 bits.
 
     Raises:

@@ -6,7 +6,6 @@ from inspect import signature
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from derain.cards.card import DataCard
 from derain.cards.rain_found import require_rain
@@ -14,7 +13,7 @@ from derain.errors import InputError
 from derain.evaluation.counts import Counts
 from derain.export.onnx_file import evaluation_on_cpu
 from derain.models.base import DerainingModule
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.views.candidate_fit import RAIN_INSIDE, fit_candidates
 from derain.views.candidates import Bound, Candidates, narrower
 from derain.views.morton import first_rows
@@ -115,9 +114,7 @@ def _require_candidates(model: DerainingModule) -> None:
         raise refusal(f"{model.NAME} judges every point alike ({error})") from error
 
 
-def _judged(
-    model: DerainingModule, scan: Scan, card: DataCard
-) -> tuple[Scan, NDArray[np.bool_], NDArray[np.bool_]]:
+def _judged(model: DerainingModule, scan: Scan, card: DataCard) -> tuple[Scan, Bools, Bools]:
     """The points of known class: those that the network calls rain, and those that are rain."""
     seen = model.spec.make_view()(scan)
     with torch.inference_mode():

@@ -15,7 +15,7 @@ from derain.evaluation.counts import or_none, ratio
 from derain.evaluation.text_tables import number_text
 from derain.export.runtime import Derainer
 from derain.export.runtimes.session import DEFAULT_RUNTIME, Runtime
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.views.probability import probability_of_rain
 from derain.views.view import ViewedScan
 
@@ -244,7 +244,7 @@ def _proof(
 def _case(
     name: str,
     view: ViewedScan,
-    returned: NDArray[np.bool_],
+    returned: Bools,
     expected: NDArray[np.float32],
     derainer: Derainer,
     bounds: Bounds,

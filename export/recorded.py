@@ -13,7 +13,7 @@ from derain.errors import InputError
 from derain.export.runtime import Derainer
 from derain.recordings.placing import PlacedFrames, PlacedMethod
 from derain.recordings.rays import RayEvidence, Rays, mean_evidence, ray_evidence
-from derain.scan import Scan
+from derain.scan import Floats, Ints, Scan
 from derain.sources.judgement import Judgement
 from derain.sources.recent_frames import FrameInWindow
 from derain.system.stopwatch import Stopwatch
@@ -31,7 +31,7 @@ OF_ENDING, OF_THROUGH = -9.81, 0.6
 
 # A judgement of another scan by itself, and what takes the frame of the scan that is judged to that
 # of the other, float64 (4, 4), metres.
-PlacedJudgement = tuple[Judgement, NDArray[np.float64]]
+PlacedJudgement = tuple[Judgement, Floats]
 
 UNLIKE = ScanIssue(
     "unlike the scans around it",
@@ -154,11 +154,7 @@ class RecordedDerainer(PlacedMethod):
         return found
 
     def _evidence(
-        self,
-        scan: Scan,
-        solid: NDArray[np.int64],
-        doubtful: NDArray[np.int64],
-        others: Sequence[PlacedJudgement],
+        self, scan: Scan, solid: Ints, doubtful: Ints, others: Sequence[PlacedJudgement]
     ) -> RayEvidence | None:
         """Evidence of the rays of other scans at the doubtful points; None if no scan matches.
 
@@ -207,6 +203,6 @@ def _fails(scan: Scan) -> ScanIssue:
     )
 
 
-def added_log_odds(evidence: RayEvidence) -> NDArray[np.float64]:
+def added_log_odds(evidence: RayEvidence) -> Floats:
     """Log-odds of rain by the rays of other scans, float64 (M,); 0 where none is near."""
     return OF_ENDING * evidence.ending + OF_THROUGH * evidence.through

@@ -20,7 +20,7 @@ from derain.export.runtimes.session import (
     Session,
     TensorType,
 )
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
@@ -91,9 +91,7 @@ class Derainer(Method):
         _refuse_other_network(self.session, self.view, self.path)
         self._recent = RecentFrames(self.view.window)
 
-    def __call__(
-        self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None
-    ) -> NDArray[np.bool_]:
+    def __call__(self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None) -> Bools:
         """Returns which points are rain.
 
         Args:

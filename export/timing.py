@@ -8,14 +8,13 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 import derain
 from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
 from derain.export.runtimes.session import DEFAULT_RUNTIME, RUNTIMES, Runtime
 from derain.files import DEFAULT_COLUMNS
-from derain.scan import Scan
+from derain.scan import Floats, Scan
 from derain.sources.folders import frame_of
 from derain.sources.frame import Frame
 from derain.system.stopwatch import Stopwatch
@@ -36,7 +35,7 @@ class RunTimes:
         stages: Those of each run by stage, float64 (runs,); 0 in stages that the method has not.
     """
 
-    stages: Mapping[str, NDArray[np.float64]]
+    stages: Mapping[str, Floats]
 
     @classmethod
     def of_no_runs(cls) -> "RunTimes":
@@ -44,7 +43,7 @@ class RunTimes:
         return cls({stage: np.zeros(0) for stage in STAGES})
 
     @property
-    def total(self) -> NDArray[np.float64]:
+    def total(self) -> Floats:
         """Milliseconds of each run in all its stages, float64 (runs,)."""
         return np.sum(list(self.stages.values()), axis=0)  # type: ignore[no-any-return]
 

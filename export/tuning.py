@@ -12,7 +12,7 @@ from derain.errors import InputError
 from derain.evaluation.counts import Counts, intersection_over_union
 from derain.export.storage import Storage
 from derain.filters import FILTERS, PointFilter, Span, filter_from, filter_view
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.views.candidates import Candidates
 from derain.views.neighbours import Neighbourhoods
 
@@ -32,9 +32,9 @@ class LabelledNeighbourhoods:
     """
 
     view: Neighbourhoods
-    rain: NDArray[np.bool_]
-    solid: NDArray[np.bool_]
-    candidate: NDArray[np.bool_]
+    rain: Bools
+    solid: Bools
+    candidate: Bools
 
     @classmethod
     def of(
@@ -168,9 +168,7 @@ def tune_filter(
     return Tuned(filter_from(name, parameters).as_dict(), iou, pooled_iou(default, labelled))
 
 
-def tune_threshold(
-    judged: Iterable[tuple[NDArray[np.float32], NDArray[np.bool_]]], threshold: float
-) -> Tuned:
+def tune_threshold(judged: Iterable[tuple[NDArray[np.float32], Bools]], threshold: float) -> Tuned:
     """Finds the best threshold of a model, exactly.
 
     Between two neighbouring probabilities all thresholds decide alike, so that one for each gap

@@ -12,13 +12,13 @@ from itertools import islice
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.bags.bag import Bag, Message
 from derain.bags.cloud_message import CDR, ROS1, CloudMessage, stamp_of
 from derain.bags.point_cloud import PointField
 from derain.bags.topics import Topic
 from derain.errors import InputError
+from derain.scan import Ints
 from derain.system.notices import warn
 
 # Up to this many clouds ahead, reading on is quicker than a search.
@@ -56,7 +56,7 @@ class CloudTopic:
         self._reader: Any = None
         self._next: int | None = None  # number of the cloud that the messages yield next
         self._last: tuple[int, Message] | None = None  # the cloud that they yielded last
-        self._times: NDArray[np.int64] | None = None
+        self._times: Ints | None = None
         self._layouts: set[tuple[PointField, ...]] = set()
         self._first_of_stamp: dict[int, int] = {}
         self._warned_of_stamps = False
@@ -132,7 +132,7 @@ class CloudTopic:
         self._messages = self.bag.messages_of(self._reader, self.topic, start)
         return first
 
-    def _times_with(self, number: int) -> NDArray[np.int64]:
+    def _times_with(self, number: int) -> Ints:
         """Time at which the clouds were recorded and taken, nanoseconds, (M, 2).
 
         The first call reads through the topic. The index may name more clouds than there are:

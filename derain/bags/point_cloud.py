@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from derain.files.columns import scan_of
 from derain.files.content import check_columns
-from derain.scan import Scan, named
+from derain.scan import Bools, Scan, named
 
 # PointField's datatypes, in NumPy's spelling.
 DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
@@ -137,7 +137,7 @@ class PointCloud:
         points = self._points.view(table)[:, 0]
         return {f.name: points[f.name].astype(f.dtype("=").base, copy=False) for f in named}
 
-    def take(self, rows: NDArray[np.bool_]) -> Self:
+    def take(self, rows: Bools) -> Self:
         """Some of its points only, every byte of each as it was, as an unorganised cloud.
 
         Where all of an unorganised cloud are taken, it stays as it is.
@@ -157,7 +157,7 @@ class PointCloud:
             data=taken.tobytes(),
         )
 
-    def blank(self, rows: NDArray[np.bool_]) -> Self:
+    def blank(self, rows: Bools) -> Self:
         """The same cloud in its shape, where x, y and z of some points are no numbers.
 
         Args:

@@ -6,12 +6,11 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.cards.layout import Layout
 from derain.errors import InputError
 from derain.files.documents import Entry, packaged, packaged_or_own, shown
-from derain.scan import LARGEST_ID, Scan
+from derain.scan import LARGEST_ID, Bools, Scan
 from derain.views.channels import UNITS
 
 Parsed = TypeVar("Parsed")
@@ -116,7 +115,7 @@ class DataCard:
         """Unit of a channel."""
         return self.intensity_unit if channel == "intensity" else UNITS.get(channel, "not stated")
 
-    def rain_of(self, scan: Scan) -> NDArray[np.bool_]:
+    def rain_of(self, scan: Scan) -> Bools:
         """True for points of a labelled scan that are rain, bool (N,).
 
         Raises:
@@ -124,7 +123,7 @@ class DataCard:
         """
         return self._of_classes(scan, self.rain)
 
-    def unknown_of(self, scan: Scan) -> NDArray[np.bool_]:
+    def unknown_of(self, scan: Scan) -> Bools:
         """True for points of a labelled scan whose class is unknown, bool (N,).
 
         Raises:
@@ -132,7 +131,7 @@ class DataCard:
         """
         return self._of_classes(scan, self.unknown)
 
-    def known_points(self, scan: Scan) -> tuple[Scan, NDArray[np.bool_]]:
+    def known_points(self, scan: Scan) -> tuple[Scan, Bools]:
         """The points of a labelled scan whose class is known.
 
         Returns:
@@ -159,7 +158,7 @@ class DataCard:
             **{name: value for name, value in statistics.items() if getattr(self, name) is None},
         )
 
-    def _of_classes(self, scan: Scan, ids: tuple[int, ...]) -> NDArray[np.bool_]:
+    def _of_classes(self, scan: Scan, ids: tuple[int, ...]) -> Bools:
         if scan.label is None:
             raise InputError(scan.name, "it has no labels", "Give its label file.")
         return np.isin(scan.label, ids)

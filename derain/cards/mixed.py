@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 from math import sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.cards.card import CHANNELS_OF_STATISTICS, DataCard
 from derain.errors import InputError
+from derain.scan import Ints
 
 # Mean and standard deviation.
 Moments = tuple[float, float]
@@ -26,7 +26,7 @@ class LabelMap:
     title: str
     ids: Mapping[int, int]
 
-    def __call__(self, label: NDArray[np.int64], name: str) -> NDArray[np.int64]:
+    def __call__(self, label: Ints, name: str) -> Ints:
         """Ids on the card of several, int64 (N,).
 
         Args:

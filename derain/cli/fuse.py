@@ -26,7 +26,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from derain.cards.card import load_card
@@ -39,7 +38,7 @@ from derain.files.extrinsics import read_extrinsics
 from derain.files.frame_times import FRAME_COLUMNS, METADATA, read_frame_times
 from derain.files.labels import LABEL, instance, read_labels, semantic, write_labels
 from derain.fusion import LABEL_WITHIN, NO_DETECTIONS, fuse, nearest_in_time
-from derain.scan import Scan
+from derain.scan import Floats, Scan
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.sources.source import Source
@@ -136,7 +135,7 @@ def main(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _times(frames: Source, columns: Sequence[str]) -> NDArray[np.float64]:
+def _times(frames: Source, columns: Sequence[str]) -> Floats:
     """Times of the frames in seconds, from the metadata in their folders."""
     return read_frame_times([Path(frame.name) for frame in frames], columns)
 
@@ -150,7 +149,7 @@ def _read(frame: Frame, option: str) -> Scan:
 
 
 def _write_metadata(
-    path: Path, frames: Source, times: NDArray[np.float64], partners: Sequence[Frame | None]
+    path: Path, frames: Source, times: Floats, partners: Sequence[Frame | None]
 ) -> None:
     """Writes when each scan was taken, and which radar frame is in it."""
     with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:

@@ -4,12 +4,11 @@ from collections.abc import Sequence
 from dataclasses import astuple, dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.cards.card import DataCard
 from derain.evaluation.counts import Counts, Mask, RainCounts, band_names, band_of, ratio, table_of
 from derain.evaluation.text_tables import number_text, plain_table
-from derain.scan import Scan
+from derain.scan import Floats, Ints, Scan
 from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
 from derain.views.morton import first_rows
@@ -27,7 +26,7 @@ _SHAPE = (len(FINE_EDGES), len(TEACHERS_ANSWERS), 2)
 OF_TEACHER = ("all points", "points it is sure of")
 
 
-def answer_of(scan: Scan, card: DataCard) -> NDArray[np.int64]:
+def answer_of(scan: Scan, card: DataCard) -> Ints:
     """The teacher's answer for each point, as a number of ``TEACHERS_ANSWERS``, int64 (N,).
 
     Args:
@@ -51,7 +50,7 @@ class Answers:
             By default there are none.
     """
 
-    table: NDArray[np.int64] = field(default_factory=lambda: np.zeros(_SHAPE, np.int64))
+    table: Ints = field(default_factory=lambda: np.zeros(_SHAPE, np.int64))
 
     @classmethod
     def of(cls, scan: Scan, card: DataCard, called_rain: Mask | None = None) -> "Answers":
@@ -86,7 +85,7 @@ class Answers:
         return int(self.table[:, RAIN].sum())
 
     @property
-    def shares(self) -> NDArray[np.float64]:
+    def shares(self) -> Floats:
         """Share of each answer of the teacher, float64 (3,); NaN where there are no points."""
         return ratio(self.table.sum(axis=(0, 2)), self.points)
 
@@ -183,7 +182,7 @@ class TruthRecord:
             counts.add(truth.take(of_answer), rain[of_answer])
         self.scans += 1
 
-    def add_cells(self, cells: Sequence[NDArray[np.int64]]) -> None:
+    def add_cells(self, cells: Sequence[Ints]) -> None:
         """Adds a scan that another record has measured.
 
         Args:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.evaluation.counts import intersection_over_union, table_of
-from derain.scan import Scan
+from derain.scan import Bools, Floats, Ints, Scan
 from derain.views.scan_issues import ScanIssue, missing_intensity
 
 # Edge of the voxels, metres, in which it is learnt where it rains.
@@ -25,12 +25,12 @@ AXIS_BITS = 21
 MOST_LIMITS = 200
 
 
-def all_points(scan: Scan) -> NDArray[np.bool_]:
+def all_points(scan: Scan) -> Bools:
     """Calls every valid point rain, bool (N,)."""
     return scan.valid
 
 
-def no_points(scan: Scan) -> NDArray[np.bool_]:
+def no_points(scan: Scan) -> Bools:
     """Calls no point rain, bool (N,)."""
     return np.zeros(len(scan), bool)
 
@@ -48,9 +48,9 @@ class PositionPrior:
             sensor. Any other voxel is not rain, including those without points in training.
     """
 
-    rain: NDArray[np.int64]
+    rain: Ints
 
-    def __call__(self, scan: Scan) -> NDArray[np.bool_]:
+    def __call__(self, scan: Scan) -> Bools:
         """True for the points called rain, bool (N,)."""
         valid = scan.valid
         called_rain = np.zeros(len(scan), bool)
@@ -58,7 +58,7 @@ class PositionPrior:
         return called_rain
 
     @classmethod
-    def learn(cls, scans: Iterable[tuple[Scan, NDArray[np.bool_]]]) -> Self:
+    def learn(cls, scans: Iterable[tuple[Scan, Bools]]) -> Self:
         """Finds the voxels that, called rain, give the greatest IoU on the training scans.
 
         They are those with the greatest shares of rain. One point with the average share of rain is
@@ -97,12 +97,12 @@ class IntensityRule:
     intensity: float
     range: float
 
-    def __call__(self, scan: Scan) -> NDArray[np.bool_]:
+    def __call__(self, scan: Scan) -> Bools:
         """True for the points called rain, bool (N,); none in a scan without intensity."""
         intensity = scan.measured_intensity
         if intensity is None:
             return np.zeros(len(scan), bool)
-        dim: NDArray[np.bool_] = intensity <= self.intensity
+        dim: Bools = intensity <= self.intensity
         return dim & (scan.range <= self.range) & scan.valid
 
     def issues(self, scan: Scan) -> Iterator[ScanIssue]:
@@ -110,7 +110,7 @@ class IntensityRule:
         yield from missing_intensity(scan)
 
     @classmethod
-    def best(cls, scans: Iterable[tuple[Scan, NDArray[np.bool_]]]) -> Self:
+    def best(cls, scans: Iterable[tuple[Scan, Bools]]) -> Self:
         """Finds the two limits of the greatest IoU.
 
         Args:
@@ -150,7 +150,7 @@ def _limits_of(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.unique(np.quantile(values, shares, method="lower"))
 
 
-def _best_called_rain(points: NDArray[np.float64], rain: NDArray[np.float64]) -> NDArray[np.int64]:
+def _best_called_rain(points: Floats, rain: Floats) -> Ints:
     """Rows of the voxels that are best called rain, by descending share of rain.
 
     Args:
@@ -169,10 +169,10 @@ def _best_called_rain(points: NDArray[np.float64], rain: NDArray[np.float64]) ->
     return order[: np.argmax(iou) + 1]
 
 
-def _voxel_of(xyz: NDArray[np.float32]) -> NDArray[np.int64]:
+def _voxel_of(xyz: NDArray[np.float32]) -> Ints:
     """Number of each point's voxel, int64 (N,); points beyond the outermost voxels lie in those."""
     half = 2 ** (AXIS_BITS - 1)
     cell = np.clip(np.floor(xyz.astype(np.float64) / VOXEL), -half, half - 1).astype(np.int64)
     x, y, z = (cell + half).T
-    number: NDArray[np.int64] = (x << 2 * AXIS_BITS) | (y << AXIS_BITS) | z
+    number: Ints = (x << 2 * AXIS_BITS) | (y << AXIS_BITS) | z
     return number

@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from derain.cards.card import DataCard
 from derain.errors import InputError
-from derain.scan import Scan
+from derain.scan import Bools, Floats, Ints, Scan
 
 # Which points of a scan of N points, bool (N,).
-Mask = NDArray[np.bool_]
+Mask = Bools
 
 SCORES = ("precision", "recall", "f1", "iou")
 
@@ -21,7 +21,7 @@ SCORES = ("precision", "recall", "f1", "iou")
 RANGE_EDGES = (0, 10, 20, 40, 80)
 
 
-def ratio(part: ArrayLike, whole: ArrayLike) -> NDArray[np.float64]:
+def ratio(part: ArrayLike, whole: ArrayLike) -> Floats:
     """Share of each part in its whole, float64, of their broadcast shape; NaN for a whole of 0.
 
     Args:
@@ -34,7 +34,7 @@ def ratio(part: ArrayLike, whole: ArrayLike) -> NDArray[np.float64]:
     return shares
 
 
-def intersection_over_union(hits: ArrayLike, errors: ArrayLike) -> NDArray[np.float64]:
+def intersection_over_union(hits: ArrayLike, errors: ArrayLike) -> Floats:
     """IoU of rain, float64, of their broadcast shape; NaN where no point is rain or called rain.
 
     Args:
@@ -44,7 +44,7 @@ def intersection_over_union(hits: ArrayLike, errors: ArrayLike) -> NDArray[np.fl
     return ratio(hits, np.add(hits, errors))
 
 
-def table_of(cells: Sequence[NDArray[np.integer]], shape: tuple[int, ...]) -> NDArray[np.int64]:
+def table_of(cells: Sequence[NDArray[np.integer]], shape: tuple[int, ...]) -> Ints:
     """Number of points in each cell of a table, int64 of its shape.
 
     Args:
@@ -61,7 +61,7 @@ def band_names() -> list[str]:
     return [*names, f"{RANGE_EDGES[-1]}+ m"]
 
 
-def band_of(range: NDArray[np.floating], edges: Sequence[float] = RANGE_EDGES) -> NDArray[np.int64]:
+def band_of(range: NDArray[np.floating], edges: Sequence[float] = RANGE_EDGES) -> Ints:
     """Number of each point's band, int64 (N,).
 
     Args:
@@ -230,7 +230,7 @@ class RainCounts:
         row, band = self._class_rows(scan.label[known]), band_of(scan.range[known])
         self.add_cells(table_of((row, band, called_rain[known].astype(np.int64)), self.cells.shape))
 
-    def add_cells(self, cells: NDArray[np.int64]) -> None:
+    def add_cells(self, cells: Ints) -> None:
         """Adds the points of one scan that are counted already.
 
         Args:
@@ -268,7 +268,7 @@ class RainCounts:
             for name, rain, bands in rows
         }
 
-    def _class_rows(self, label: NDArray[np.int64]) -> NDArray[np.int64]:
+    def _class_rows(self, label: Ints) -> Ints:
         strange = label[~np.isin(label, self.ids)]
         if len(strange):
             raise InputError(
@@ -278,7 +278,7 @@ class RainCounts:
             )
         return np.searchsorted(self.ids, label).astype(np.int64)
 
-    def _counts(self, cells: NDArray[np.int64]) -> Counts:
+    def _counts(self, cells: Ints) -> Counts:
         """Adds up the points of some cells, int64 (classes, any bands, 2)."""
         false_negative, true_positive = cells[self.is_rain].sum(axis=(0, 1)).tolist()
         true_negative, false_positive = cells[~self.is_rain].sum(axis=(0, 1)).tolist()

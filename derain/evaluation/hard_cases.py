@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 
 
 def scene(points: int = 3000, seed: int = 0) -> NDArray[np.float32]:
@@ -95,7 +95,7 @@ def _without_inclinations(
     """Removes the points between two inclinations, in degrees."""
     x, y, z = points[:, :3].T
     inclination = np.degrees(np.arctan2(z, np.hypot(x, y)))
-    outside: NDArray[np.bool_] = (inclination < lowest) | (inclination > highest)
+    outside: Bools = (inclination < lowest) | (inclination > highest)
     return points[outside]
 
 

@@ -2,16 +2,14 @@
 
 from dataclasses import astuple
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 from torchmetrics import Metric
 from torchmetrics.utilities import dim_zero_cat
 
 from derain.cards.card import DataCard
 from derain.evaluation.counts import SCORES, Counts, RainCounts, mean_over_scans
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 
 
 class RainMetrics(Metric):
@@ -43,7 +41,7 @@ class RainMetrics(Metric):
         # A process that saw no scan still needs a tensor of the right width and type to gather.
         self.per_scan.append(self.cells.new_empty(0, 4))
 
-    def update(self, scan: Scan, called_rain: NDArray[np.bool_]) -> None:
+    def update(self, scan: Scan, called_rain: Bools) -> None:
         """Counts the points of one labelled scan.
 
         Args:

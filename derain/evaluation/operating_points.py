@@ -11,6 +11,7 @@ from torch import Tensor
 from torchmetrics import Metric
 
 from derain.evaluation.counts import Counts, intersection_over_union, ratio, table_of
+from derain.scan import Bools, Floats, Ints
 
 # Thresholds from 0 to 1 in equal steps; TensorBoard's curves take no more than 127.
 CURVE_THRESHOLDS = np.linspace(0, 1, 101)
@@ -34,24 +35,24 @@ class OperatingPoints:
         other: Points that are not.
     """
 
-    thresholds: NDArray[np.float64]
-    true_positive: NDArray[np.int64]
-    false_positive: NDArray[np.int64]
+    thresholds: Floats
+    true_positive: Ints
+    false_positive: Ints
     rain: int
     other: int
 
     @property
-    def precision(self) -> NDArray[np.float64]:
+    def precision(self) -> Floats:
         """Share of rain among what is called rain, float64 (T,); NaN where nothing is."""
         return ratio(self.true_positive, self.true_positive + self.false_positive)
 
     @property
-    def recall(self) -> NDArray[np.float64]:
+    def recall(self) -> Floats:
         """Share of the rain that is called rain, float64 (T,); NaN where there is none."""
         return ratio(self.true_positive, self.rain)
 
     @property
-    def iou(self) -> NDArray[np.float64]:
+    def iou(self) -> Floats:
         """IoU of rain, float64 (T,); NaN where no point is rain or called rain."""
         missed = self.rain - self.true_positive
         return intersection_over_union(self.true_positive, self.false_positive + missed)
@@ -107,7 +108,7 @@ class ThresholdCounts(Metric):
         bins = torch.zeros(2, len(self.thresholds) + 1, dtype=torch.int64)
         self.add_state("bins", bins, dist_reduce_fx="sum")
 
-    def update(self, probability: NDArray[np.float32], rain: NDArray[np.bool_]) -> None:
+    def update(self, probability: NDArray[np.float32], rain: Bools) -> None:
         """Counts the points of a scan.
 
         Args:

@@ -3,10 +3,7 @@
 from dataclasses import dataclass
 from typing import Self
 
-import numpy as np
-from numpy.typing import NDArray
-
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.views.morton import distinct_rows
 from derain.views.returns import RayReturns
 
@@ -29,7 +26,7 @@ class RayCounts:
     given_back: int
 
     @classmethod
-    def of(cls, scan: Scan, returns: RayReturns, rain: NDArray[np.bool_] | None = None) -> Self:
+    def of(cls, scan: Scan, returns: RayReturns, rain: Bools | None = None) -> Self:
         """Counts the rays of a scan.
 
         Args:

@@ -7,16 +7,15 @@ from itertools import repeat
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.cards.card import DataCard
 from derain.errors import reason_of
 from derain.evaluation.counts import Counts, RainCounts
-from derain.scan import Scan
+from derain.scan import Bools, Ints, Scan
 from derain.views.morton import first_rows
 
 # Returns which points of a scan are rain, bool (N,).
-ScoredMethod = Callable[[Scan], NDArray[np.bool_]]
+ScoredMethod = Callable[[Scan], Bools]
 
 
 class Scores(RainCounts):
@@ -41,9 +40,7 @@ class Scores(RainCounts):
         """Scans of one rain rate, by names such as ``25 mm/h``; empty where none is known."""
         return {f"{rate:g} mm/h": counts for rate, counts in sorted(self._by_rate.items())}
 
-    def judge(
-        self, method: ScoredMethod, scan: Scan, counted: NDArray[np.int64], rate: float | None
-    ) -> None:
+    def judge(self, method: ScoredMethod, scan: Scan, counted: Ints, rate: float | None) -> None:
         """Judges a whole scan, and counts some of its rows."""
         try:
             predicted = method(scan)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.files.documents import Entry
-from derain.scan import to_float32
+from derain.scan import Floats, to_float32
 
 POSE = ("x", "y", "z", "roll", "pitch", "yaw")
 
@@ -27,7 +27,7 @@ class Extrinsics:
         ValueError: A matrix that is not rigid.
     """
 
-    matrix: NDArray[np.float64]
+    matrix: Floats
 
     def __post_init__(self) -> None:
         if not (
@@ -92,7 +92,7 @@ def read_extrinsics(path: Path) -> Extrinsics:
         raise matrix.fault(str(error), "Write a rigid motion, or the sensor's pose.") from error
 
 
-def _is_rotation(matrix: NDArray[np.float64]) -> bool:
+def _is_rotation(matrix: Floats) -> bool:
     # Large elements are refused first, before their squares can overflow.
     return bool(
         np.abs(matrix).max() <= 1 + ROTATION_TOLERANCE
@@ -101,7 +101,7 @@ def _is_rotation(matrix: NDArray[np.float64]) -> bool:
     )
 
 
-def _rotation(roll: float, pitch: float, yaw: float) -> NDArray[np.float64]:
+def _rotation(roll: float, pitch: float, yaw: float) -> Floats:
     """Turns by roll about x, then pitch about y, then yaw about z, degrees; float64 (3, 3)."""
     cr, cp, cy = np.cos(np.radians([roll, pitch, yaw]))
     sr, sp, sy = np.sin(np.radians([roll, pitch, yaw]))

@@ -7,11 +7,11 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.names import COMPRESSED
 from derain.files.reading import is_file, read_bytes, reading
+from derain.scan import Floats
 
 METADATA = "metadata.csv"
 
@@ -22,9 +22,7 @@ LARGEST_METADATA = 2**23
 FRAME_COLUMNS = ("frame", "timestamp")
 
 
-def read_frame_times(
-    scans: Sequence[Path], columns: Sequence[str] = FRAME_COLUMNS
-) -> NDArray[np.float64]:
+def read_frame_times(scans: Sequence[Path], columns: Sequence[str] = FRAME_COLUMNS) -> Floats:
     """Reads when scans of one folder were taken.
 
     Args:

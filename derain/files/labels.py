@@ -14,7 +14,7 @@ from derain.errors import InputError
 from derain.files.atomic import replacing
 from derain.files.names import beside
 from derain.files.reading import file_size, read_bytes, reading
-from derain.scan import LARGEST_ID, class_ids
+from derain.scan import LARGEST_ID, Ints, class_ids
 
 LABEL = ".label"
 
@@ -52,12 +52,12 @@ def read_labels(path: Path, points: int) -> NDArray[np.uint32]:
         return np.frombuffer(read_bytes(path, size), "<u4", points).astype(np.uint32)
 
 
-def semantic(raw: NDArray[np.uint32]) -> NDArray[np.int64]:
+def semantic(raw: NDArray[np.uint32]) -> Ints:
     """Semantic class ids, int64 (N,), of labels as `read_labels` gives them."""
     return class_ids(raw)
 
 
-def instance(raw: NDArray[np.uint32]) -> NDArray[np.int64]:
+def instance(raw: NDArray[np.uint32]) -> Ints:
     """Instance ids, int64 (N,), of labels as `read_labels` gives them."""
     return (raw >> 16).astype(np.int64)
 

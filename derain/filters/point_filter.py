@@ -58,7 +58,7 @@ class PointFilter(ABC):
             neighbours: int = 2
             reach: float = 5.0
 
-            def judge(self, view: Neighbourhoods) -> NDArray[np.bool_]:
+            def judge(self, view: Neighbourhoods) -> Bools:
                 return np.linalg.norm(view.points[:, :3], axis=1) < self.reach
 
     Attributes:

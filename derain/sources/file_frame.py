@@ -4,15 +4,12 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS, count_points, read_scan
 from derain.files.labels import read_labels, semantic
 from derain.files.names import scan_stem
 from derain.files.reading import file_size, is_file, read_bytes, reading, stamp_of
-from derain.scan import Scan
+from derain.scan import Floats, Ints, Scan
 from derain.sources.frame import Frame
 from derain.sources.records import Records
 from derain.stores.url import url_of
@@ -51,7 +48,7 @@ class FileFrame(Frame):
         return None if self.records is None else self.records.time_of(self.path)
 
     @property
-    def pose(self) -> NDArray[np.float64] | None:
+    def pose(self) -> Floats | None:
         """Sensor to world, float64 (4, 4), as it was given, or else of its records."""
         if self.sensor_to_world is not None or self.records is None:
             return self.sensor_to_world
@@ -66,7 +63,7 @@ class FileFrame(Frame):
         """Reads the scan, without labels."""
         return read_scan(self.path, self.columns).with_intensity_times(self.intensity_scale)
 
-    def read_label(self, points: int) -> NDArray[np.int64]:
+    def read_label(self, points: int) -> Ints:
         """Reads the semantic class ids of its points, int64 (N,)."""
         if self.label_path is None:
             raise InputError(self.path, "it has no labels", "Give its label file.")

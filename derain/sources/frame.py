@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.cards.mixed import LabelMap
 from derain.errors import InputError
 from derain.files.extrinsics import Extrinsics
-from derain.scan import Scan
+from derain.scan import Floats, Ints, Scan
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -39,7 +38,7 @@ class Frame(ABC):
     number: int = 0
     label_path: Path | None = None
     intensity_scale: float = 1.0
-    sensor_to_world: NDArray[np.float64] | None = None
+    sensor_to_world: Floats | None = None
     label_map: LabelMap | None = None
 
     @property
@@ -62,7 +61,7 @@ class Frame(ABC):
         return None
 
     @property
-    def pose(self) -> NDArray[np.float64] | None:
+    def pose(self) -> Floats | None:
         """Transformation from the sensor's frame to a fixed frame, float64 (4, 4), metres.
 
         None if it is not known.
@@ -105,7 +104,7 @@ class Frame(ABC):
         """
 
     @abstractmethod
-    def read_label(self, points: int) -> NDArray[np.int64]:
+    def read_label(self, points: int) -> Ints:
         """Reads the semantic class ids of its points, int64 (N,), as its own data set has them.
 
         Args:
@@ -163,7 +162,7 @@ class Frame(ABC):
         """The same frame without its labels."""
         return replace(self, label_path=None)
 
-    def with_pose(self, pose: NDArray[np.float64]) -> Self:
+    def with_pose(self, pose: Floats) -> Self:
         """The same frame at a given pose, in place of a pose in a file beside the scan.
 
         Args:
@@ -219,7 +218,7 @@ class MemoryFrame(Frame):
         """The scan, without labels."""
         return replace(self.scan, label=None).with_intensity_times(self.intensity_scale)
 
-    def read_label(self, points: int) -> NDArray[np.int64]:
+    def read_label(self, points: int) -> Ints:
         """The semantic class ids of its points, int64 (N,)."""
         if self.scan.label is None:
             raise InputError(self.name, "it has no labels", "Give the scan its labels.")

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.sources.frame import Frame
 from derain.weather.scan_weather import ScanWeather
 
@@ -29,23 +29,23 @@ class Judgement:
     """
 
     probability: NDArray[np.float32]
-    rain: NDArray[np.bool_]
-    judged: NDArray[np.bool_]
+    rain: Bools
+    judged: Bools
     scan: Scan
     frame: Frame | None = None
-    known: NDArray[np.bool_] | None = None
+    known: Bools | None = None
 
     def __post_init__(self) -> None:
         if self.known is not None:
             object.__setattr__(self, "rain", self.rain & self.known)
 
     @property
-    def answered(self) -> NDArray[np.bool_]:
+    def answered(self) -> Bools:
         """True for rows that were judged, and with certainty, bool (N,)."""
         return self.judged if self.known is None else self.judged & self.known
 
     @property
-    def possible(self) -> NDArray[np.bool_]:
+    def possible(self) -> Bools:
         """True for points that can be judged, bool (N,): the valid ones, and all that were."""
         return self.scan.valid | self.judged
 

@@ -4,16 +4,16 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.reading import read_bytes, reading
+from derain.scan import Floats
 
 # A pose takes 160 bytes: those of four hundred thousand scans.
 LARGEST_RECORD = 2**26
 
 
-def read_numbers(path: Path, *columns: int) -> NDArray[np.float64]:
+def read_numbers(path: Path, *columns: int) -> Floats:
     """Reads lines of finite numbers; empty lines and comments (#) are skipped.
 
     Args:

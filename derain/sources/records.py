@@ -8,14 +8,12 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, lru_cache
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from derain.errors import InputError
 from derain.files import find_scans
 from derain.files.frame_times import METADATA, read_frame_times
 from derain.files.names import scan_stem
 from derain.files.reading import is_file, stamp_of
+from derain.scan import Floats
 from derain.sources.frame import Frame, times_of
 from derain.sources.number_lines import read_numbers
 from derain.sources.trajectory import CALIBRATION, Trajectory, read_trajectory
@@ -44,7 +42,7 @@ class Records:
         times = self._times
         return None if times is None else float(times[self._line(scan, TIMES, len(times))])
 
-    def pose_of(self, scan: Path) -> NDArray[np.float64] | None:
+    def pose_of(self, scan: Path) -> Floats | None:
         """Sensor to world of a scan of the folder, float64 (4, 4), metres; None if not known.
 
         Raises:
@@ -57,7 +55,7 @@ class Records:
         times = None if trajectory.times is None else self._times
         if times is not None and trajectory.is_by_time(times):
             return trajectory.at(float(times[self._line(scan, TIMES, len(times))]), scan.name)
-        pose: NDArray[np.float64] = trajectory.poses[self._line(scan, POSES, len(trajectory))]
+        pose: Floats = trajectory.poses[self._line(scan, POSES, len(trajectory))]
         return pose
 
     @cached_property
@@ -71,7 +69,7 @@ class Records:
         return records_of, (self.folder,)  # a copy in another process reads them again
 
     @cached_property
-    def _times(self) -> NDArray[np.float64] | None:
+    def _times(self) -> Floats | None:
         """Seconds of each scan or line, float64 (T,)."""
         if path := self._beside(TIMES):
             return read_numbers(path, 1)[:, 0]
@@ -110,9 +108,7 @@ def records_of(folder: Path) -> Records:
     return Records(folder)
 
 
-def poses_along(
-    recording: Sequence[Frame], trajectory: Trajectory
-) -> Iterator[NDArray[np.float64]]:
+def poses_along(recording: Sequence[Frame], trajectory: Trajectory) -> Iterator[Floats]:
     """The pose of each frame of a recording, float64 (4, 4), metres.
 
     Args:

@@ -5,13 +5,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from derain.bags.names import ROS1_SUFFIX, stem
 from derain.errors import InputError
 from derain.files import read_scan
-from derain.scan import Scan
+from derain.scan import Floats, Scan
 from derain.sources.bag_frame import bag_frames
 from derain.sources.file_frame import FileFrame
 from derain.sources.records import poses_along
@@ -64,7 +61,7 @@ class StoredScan(StoredFrame):
     """
 
     recorded_time: float | InputError | None = None
-    recorded_pose: NDArray[np.float64] | InputError | None = None
+    recorded_pose: Floats | InputError | None = None
     records_stamp: str = ""
     file: Path | None = None
 
@@ -74,7 +71,7 @@ class StoredScan(StoredFrame):
         return _value(self.recorded_time)
 
     @property
-    def pose(self) -> NDArray[np.float64] | None:
+    def pose(self) -> Floats | None:
         """Sensor to world, float64 (4, 4), as it was given, or else of its records."""
         return _value(self.recorded_pose) if self.sensor_to_world is None else self.sensor_to_world
 

@@ -16,12 +16,12 @@ from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.atomic import write_text
 from derain.files.extrinsics import ROTATION_TOLERANCE, Extrinsics
 from derain.files.reading import is_file
+from derain.scan import Floats
 from derain.sources.number_lines import finite_numbers, read_lines, read_numbers
 
 CALIBRATION = "calib.txt"
@@ -48,8 +48,8 @@ class Trajectory:
         name: Its name in messages, such as its file.
     """
 
-    poses: NDArray[np.float64]
-    times: NDArray[np.float64] | None = None
+    poses: Floats
+    times: Floats | None = None
     name: str | Path = "poses"
 
     def __len__(self) -> int:
@@ -60,7 +60,7 @@ class Trajectory:
         times = b"" if self.times is None else self.times.tobytes()
         return sha256(self.poses.tobytes() + times).hexdigest()
 
-    def is_by_time(self, times: Sequence[float] | NDArray[np.float64]) -> bool:
+    def is_by_time(self, times: Sequence[float] | Floats) -> bool:
         """True if scans find their poses by time: both have times, of one clock it seems.
 
         Args:
@@ -71,7 +71,7 @@ class Trajectory:
         first, last = self.times[0] - LONGEST_GAP, self.times[-1] + LONGEST_GAP
         return bool(first <= np.max(times) and np.min(times) <= last)
 
-    def at(self, time: float, scan: str) -> NDArray[np.float64]:
+    def at(self, time: float, scan: str) -> Floats:
         """The pose at a time; between two poses, on the way from one to the other.
 
         Args:
@@ -96,10 +96,10 @@ class Trajectory:
                 f"{start:.3f} and {end:.3f} s",
                 "Give the poses of the whole recording, by the clock of its scans.",
             )
-        one: NDArray[np.float64] = self.poses[before]
+        one: Floats = self.poses[before]
         if before == after:
             return one
-        other: NDArray[np.float64] = self.poses[after]
+        other: Floats = self.poses[after]
         share = float((inside - start) / (end - start))
         pose = np.eye(4)
         pose[:3, 3] = (1 - share) * one[:3, 3] + share * other[:3, 3]
@@ -158,11 +158,11 @@ def write_trajectory(path: Path, trajectory: Trajectory) -> None:
     write_text(path, "".join(f"{line}\n" for line in lines))
 
 
-def _words(numbers: NDArray[np.float64]) -> str:
+def _words(numbers: Floats) -> str:
     return " ".join(f"{number:.12g}" for number in numbers)
 
 
-def _trajectory_of_tum(path: Path, rows: NDArray[np.float64]) -> Trajectory:
+def _trajectory_of_tum(path: Path, rows: Floats) -> Trajectory:
     times, quaternions = rows[:, 0], rows[:, 4:]
     if not (np.diff(times) > 0).all():
         place = int(np.argmin(np.diff(times) > 0)) + 2
@@ -187,7 +187,7 @@ def _trajectory_of_tum(path: Path, rows: NDArray[np.float64]) -> Trajectory:
     return Trajectory(poses, times, path)
 
 
-def _motions(path: Path, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+def _motions(path: Path, rows: Floats) -> Floats:
     """Homogeneous transformations, float64 (T, 4, 4), of their upper three rows, (T, 12)."""
     motions = np.zeros((len(rows), 4, 4))
     motions[:, :3] = rows.reshape(-1, 3, 4)
@@ -202,13 +202,13 @@ def _motions(path: Path, rows: NDArray[np.float64]) -> NDArray[np.float64]:
     return motions
 
 
-def _lidar_to_camera(path: Path) -> NDArray[np.float64]:
+def _lidar_to_camera(path: Path) -> Floats:
     """The motion that a calibration names Tr, float64 (4, 4)."""
     for place, line in enumerate(read_lines(path), 1):
         name, _, numbers = line.partition(":")
         if name.strip() == LIDAR_TO_CAMERA:
             row = finite_numbers(path, place, numbers.split(), KITTI)
-            motion: NDArray[np.float64] = _motions(path, np.array([row]))[0]
+            motion: Floats = _motions(path, np.array([row]))[0]
             return motion
     raise InputError(
         path,
@@ -217,7 +217,7 @@ def _lidar_to_camera(path: Path) -> NDArray[np.float64]:
     )
 
 
-def rotation_of(quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
+def rotation_of(quaternion: Floats) -> Floats:
     """The rotation of a unit quaternion.
 
     Args:
@@ -238,7 +238,7 @@ def rotation_of(quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
     )
 
 
-def quaternion_of(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
+def quaternion_of(rotation: Floats) -> Floats:
     """The unit quaternion of a rotation, x, y, z, w with w of 0 or more, float64 (4,).
 
     Args:
@@ -252,13 +252,11 @@ def quaternion_of(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
     symmetric[:3, :3] = r + r.T - np.trace(r) * np.eye(3)
     symmetric[3, :3] = symmetric[:3, 3] = r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]
     symmetric[3, 3] = np.trace(r)
-    quaternion: NDArray[np.float64] = np.linalg.eigh(symmetric)[1][:, -1]
+    quaternion: Floats = np.linalg.eigh(symmetric)[1][:, -1]
     return -quaternion if quaternion[3] < 0 else quaternion
 
 
-def slerp(
-    first: NDArray[np.float64], second: NDArray[np.float64], share: float
-) -> NDArray[np.float64]:
+def slerp(first: Floats, second: Floats, share: float) -> Floats:
     """A rotation on the shortest way from one to another.
 
     Args:
@@ -275,5 +273,5 @@ def slerp(
     if not angle:
         return first
     weights = np.sin([(1 - share) * angle, share * angle]) / np.sin(angle)
-    mixed: NDArray[np.float64] = weights[0] * first + weights[1] * second
+    mixed: Floats = weights[0] * first + weights[1] * second
     return mixed

@@ -5,7 +5,6 @@ from dataclasses import replace
 from itertools import compress
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from derain.annotation.teach import TAUGHT_CARD, labels_of
@@ -27,7 +26,7 @@ from derain.evaluation.text_tables import markdown_table, number_text
 from derain.pictures.answers import answers_figure
 from derain.pictures.scan_pictures import before_after_figure, save
 from derain.recordings.persistence import PersistenceDerainer
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.sources.bag_frame import BagFrame
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
@@ -38,7 +37,7 @@ from derain.sources.spread import evenly_spaced
 from derain.workflows.learn_report import LearnResults
 
 # Returns which points of a scan of N points are rain, bool (N,).
-Student = Callable[[Scan], NDArray[np.bool_]]
+Student = Callable[[Scan], Bools]
 
 # Scans counted of a long recording, held-out scans measured, and of these drawn.
 MOST_COUNTED = 300

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from derain.cards.card import DataCard, load_card
@@ -28,7 +27,7 @@ from derain.files import DEFAULT_COLUMNS
 from derain.filters import PointFilter
 from derain.filters.point_filter import filter_view, rain_among, rows_of
 from derain.jobs.running import Submits, Task, ValueWork, values
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.sources.folders import GivenScans, source_of
 from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
@@ -257,9 +256,7 @@ def scored_methods(bench_entries: Sequence[BenchEntry], threads: int) -> list[Sc
     most = max((row.filter.neighbours for row in bench_entries if row.filter), default=0)
     seen_by_filters = lru_cache(maxsize=1)(filter_view(most, threads))
 
-    def filtered(
-        filter: PointFilter, candidates: Candidates | None, scan: Scan
-    ) -> NDArray[np.bool_]:
+    def filtered(filter: PointFilter, candidates: Candidates | None, scan: Scan) -> Bools:
         seen = seen_by_filters(scan)
         return rows_of(rain_among(filter, seen, scan, candidates), seen.inverse)
 
@@ -279,7 +276,7 @@ def _overlap(method: BenchEntry, data: LabelledFrames) -> str | None:
     return training_overlap(method.title, spec, data.card, data.frames)
 
 
-def _untimed(method: TimedMethod, scan: Scan) -> NDArray[np.bool_]:
+def _untimed(method: TimedMethod, scan: Scan) -> Bools:
     return method(scan, Stopwatch())
 
 

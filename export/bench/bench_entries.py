@@ -29,14 +29,14 @@ from derain.export.runtime import Derainer
 from derain.export.runtimes.session import Runtime
 from derain.filters import FilterDerainer, PointFilter
 from derain.filters.derainer import CANDIDATES
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.spec import Spec
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
 from derain.views.scan_issues import ScanChecker
 
 # Returns which points of a scan are rain, bool (N,), and times its stages.
-TimedMethod = Callable[[Scan, Stopwatch], NDArray[np.bool_]]
+TimedMethod = Callable[[Scan, Stopwatch], Bools]
 
 # Name of the fact that holds the bytes of a method's file.
 FILE_SIZE = "file_bytes"
@@ -47,7 +47,7 @@ GivenMethod = str | Path | Derainer | FilterDerainer | PointFilter | Callable[[S
 
 # Returns scans without points of unknown class, and their rain, bool (N,), for baselines to learn
 # from.
-LearnFrom = Callable[[], Iterable[tuple[Scan, NDArray[np.bool_]]]]
+LearnFrom = Callable[[], Iterable[tuple[Scan, Bools]]]
 
 # The baselines that ignore the scan, and those that learn from labelled scans.
 TRIVIAL = {"all": all_points, "none": no_points}
@@ -278,7 +278,7 @@ class TimedFunction:
         """The method itself; a bench does not control the threads of a function."""
         return self
 
-    def __call__(self, scan: Scan, stopwatch: Stopwatch) -> NDArray[np.bool_]:
+    def __call__(self, scan: Scan, stopwatch: Stopwatch) -> Bools:
         """True for points that are rain, bool (N,).
 
         Raises:

@@ -3,12 +3,9 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
 from derain.cards.card import DataCard
 from derain.errors import InputError
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
 from derain.sources.spread import evenly_spaced
@@ -44,7 +41,7 @@ class LabelledFrames:
         for frame in self.frames:
             frame.require_labels()
 
-    def truths(self) -> Iterator[tuple[Scan, NDArray[np.bool_]]]:
+    def truths(self) -> Iterator[tuple[Scan, Bools]]:
         """Reads some of the scans, spread evenly: points of known class, and which are rain.
 
         Raises:

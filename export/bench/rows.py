@@ -5,7 +5,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.evaluation.counts import (
     SCORES,
@@ -18,6 +17,7 @@ from derain.evaluation.scores import Scores
 from derain.export.bench.bench_entries import BenchEntry
 from derain.export.bench.cost import Cost
 from derain.export.timing import STAGES
+from derain.scan import Floats, Ints
 
 DRAWS = 2000
 CONFIDENCE = 0.95
@@ -121,7 +121,7 @@ def _all_scores(groups: Mapping[str, Counts]) -> dict[str, dict[str, float | Non
 
 
 def bootstrap(
-    found: NDArray[np.int64], errors: NDArray[np.int64], generator: np.random.Generator
+    found: Ints, errors: Ints, generator: np.random.Generator
 ) -> tuple[list[Interval | None], list[Interval | None]]:
     """95 % intervals of every method's pooled IoU, and of what it is behind the best method's.
 
@@ -157,11 +157,11 @@ def bootstrap(
     return _intervals(iou), _intervals(iou[best] - iou)
 
 
-def _intervals(draws: NDArray[np.float64]) -> list[Interval | None]:
+def _intervals(draws: Floats) -> list[Interval | None]:
     return [_interval(each[~np.isnan(each)]) for each in draws]
 
 
-def _interval(draws: NDArray[np.float64]) -> Interval | None:
+def _interval(draws: Floats) -> Interval | None:
     if not len(draws):
         return None
     tail = 50 * (1 - CONFIDENCE)

@@ -6,7 +6,6 @@ import lightning
 import numpy as np
 from lightning.pytorch.loggers import TensorBoardLogger
 from lightning.pytorch.trainer.states import TrainerFn
-from numpy.typing import NDArray
 
 from derain.evaluation.counts import RainCounts, band_names
 from derain.evaluation.operating_points import CURVE_THRESHOLDS, OperatingPoints
@@ -15,6 +14,7 @@ from derain.models.base import DerainingModule
 from derain.models.callbacks.step_times import SPEED, STEP
 from derain.pictures.error_pictures import errors_figure, operating_points_figure
 from derain.pictures.scan_pictures import judgement_figure
+from derain.scan import Floats, Ints
 
 # Groups of scalars.
 BY_CLASS, LEFT_BY_RANGE, LOST_BY_RANGE = "errors_by_class", "rain_left_by_range", "lost_by_range"
@@ -205,7 +205,7 @@ def errors_by_name(measured: RainCounts) -> dict[str, float]:
     return shares
 
 
-def _of_curve(points: OperatingPoints) -> tuple[NDArray[np.float64] | NDArray[np.int64], ...]:
+def _of_curve(points: OperatingPoints) -> tuple[Floats | Ints, ...]:
     """A curve in TensorBoard's form, at thresholds from 0 to 1 in equal steps."""
     even = np.searchsorted(points.thresholds, CURVE_THRESHOLDS)
     hits, false = points.true_positive[even], points.false_positive[even]

@@ -23,7 +23,7 @@ from derain.files.content import Content
 from derain.files.format import FORMATS, Format
 from derain.files.names import scan_suffix
 from derain.files.text import encode
-from derain.scan import LARGEST_COORDINATE, Scan
+from derain.scan import LARGEST_COORDINATE, Floats, Ints, Scan
 from derain.system.extras import LASPY
 
 # Sizes of the header, up to version 1.3 and from 1.4 on.
@@ -59,7 +59,7 @@ class LasHeader:
     """
 
     header: Any
-    origin: NDArray[np.int64]
+    origin: Ints
 
 
 @FORMATS.add(".las", ".laz")
@@ -261,7 +261,7 @@ def _check_layers(data: bytes, begin: int, end: int, size: int, layers: int) -> 
         raise ValueError("a chunk that is not in the file")
 
 
-def _origin(whole: NDArray[np.int64], scales: NDArray[np.float64]) -> NDArray[np.int64]:
+def _origin(whole: Ints, scales: Floats) -> Ints:
     """The origin of the scan's coordinates."""
     if not ((scales > _FINEST_SCALE) & (scales < LARGEST_COORDINATE)).all():
         raise ValueError(f"the scales of the coordinates are {scales}")
@@ -271,7 +271,7 @@ def _origin(whole: NDArray[np.int64], scales: NDArray[np.float64]) -> NDArray[np
     return np.where(np.abs(median * scales) > _FAR, median, 0)
 
 
-def _stored(path: Path, numbers: NDArray[np.float64]) -> NDArray[np.int32]:
+def _stored(path: Path, numbers: Floats) -> NDArray[np.int32]:
     """Coordinates as LAS stores them."""
     whole = np.rint(numbers)
     if not ((whole >= -(2**31)) & (whole < 2**31)).all():

@@ -22,7 +22,7 @@ from derain.files.content import Content, check_columns
 from derain.files.format import FORMATS, Format
 from derain.files.names import scan_suffix
 from derain.files.text import decode, encode
-from derain.scan import Scan
+from derain.scan import Ints, Scan
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
@@ -59,7 +59,7 @@ class TableHeader:
     named: bool
     text: bytes
     begin: int
-    spans: NDArray[np.int64]
+    spans: Ints
     columns: Mapping[str, NDArray[Any]]
 
     def take(self, rows: NDArray[Any]) -> "TableHeader":
@@ -214,7 +214,7 @@ def _filled_lines(text: bytes) -> Iterator[Line]:
 
 def _parse_lines(
     lines: Iterator[Line], separator: str | None, titles: Sequence[str]
-) -> tuple[list[NDArray[Any]], NDArray[np.int64]]:
+) -> tuple[list[NDArray[Any]], Ints]:
     """The columns of lines, and their spans as in TableHeader.
 
     Args:
