@@ -27,7 +27,7 @@ DOUBTFUL = 0.01
 # Log-odds of rain that rays of other scans add to those of the model, fitted to simulated drives by
 # benchmarks/persistence_weights.py: for the share of them that ends at a place, and for the share
 # that went through it.
-OF_ENDING, OF_THROUGH = -9.81, 0.6
+OF_ENDING, OF_THROUGH = -10.16, 0.59
 
 # A judgement of another scan by itself, and what takes the frame of the scan that is judged to that
 # of the other, float64 (4, 4), metres.
