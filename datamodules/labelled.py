@@ -15,6 +15,7 @@ from derain.cards.known import card_by_folders, layouts_for
 from derain.cards.layout import Layout
 from derain.datamodules.scan_data import Loading, Part, ScanData, split_source, taught_source
 from derain.errors import InputError
+from derain.example import example_folder, or_example
 from derain.files.documents import Entry
 from derain.simulation.manifest import RAIN_RATE, manifest_of, rates_of_sequences, read_manifest
 from derain.sources.folders import named_frames
@@ -116,16 +117,16 @@ def card_of(paths: Sequence[Path], name: str | None) -> DataCard:
     Args:
         paths: Scans and folders of scans, or the root of one data set.
         name: A packaged card or a YAML file; None takes that of simulated data where the first
-            path is in a simulated data set, that of a teacher's labels in a taught folder, and else
-            recognises REHEARSE-3D by its folders.
+            path is the example or a simulated data set, that of a teacher's labels in a taught
+            folder, and else recognises REHEARSE-3D by its folders.
 
     Raises:
         InputError: No such card, or data that are not recognised.
     """
     if name is not None:
         return load_card(name)
-    root = paths[0]
-    if manifest_of(root):
+    root = or_example(paths[0])
+    if manifest_of(root) or root == example_folder():
         return load_card("simulated")
     if is_taught(root):
         return load_card(root / CARD)

@@ -25,6 +25,7 @@ from derain.bags.names import split
 from derain.cli import options
 from derain.cli.method_options import add_runtime, runtime_of
 from derain.cli.outputs import print_lines
+from derain.default import DEFAULT
 from derain.errors import InputError
 from derain.files.reading import is_file
 from derain.sources.folders import named_frames
@@ -43,7 +44,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
-    parser.add_argument("checkpoint", type=Path, help="checkpoint of derain")
+    parser.add_argument("checkpoint", help=f"checkpoint of derain, or {DEFAULT}")
     parser.add_argument(
         "--out", type=options.file_named(".onnx"), required=True, help="the ONNX file to write"
     )
@@ -91,6 +92,7 @@ def main(arguments: argparse.Namespace) -> int:
     from derain.export.quantisation import CALIBRATION_SCANS
     from derain.export.timing import measure_latency
     from derain.models.checkpoint import load_model
+    from derain.workflows.start import checkpoint_of
 
     out, scan = arguments.out, arguments.scan
     if scan is not None and not (is_file(scan) or split(scan)):
@@ -102,7 +104,7 @@ def main(arguments: argparse.Namespace) -> int:
             "--int8", "needs --calibration, and that needs it", "Give both or neither."
         )
     runtime = runtime_of(arguments)
-    model = load_model(arguments.checkpoint)
+    model = load_model(checkpoint_of(arguments.checkpoint))
     frames = named_frames(arguments.calibration, arguments.columns).map(
         lambda frame: frame.with_intensity_times(arguments.intensity_scale)
     )

@@ -10,6 +10,7 @@ from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
 from derain.export.runtime import Derainer
 from derain.files import read_scan
+from derain.models.base import DerainingModule
 from derain.models.checkpoint import save_model
 
 
@@ -33,6 +34,21 @@ def test_a_checkpoint_becomes_a_model_with_its_proof_and_times(
     np.testing.assert_allclose(
         first.probability(scene()), second.probability(scene()), rtol=0, atol=1e-6
     )
+
+
+def test_the_model_that_comes_with_derain_is_exported_by_its_name(
+    succeed, here, monkeypatch
+) -> None:
+    exported = []
+
+    def keep(model: DerainingModule, path: Path, *_: object) -> None:
+        exported.append(model.spec)
+        path.touch()
+
+    monkeypatch.setattr(onnx_file, "export", keep)
+    monkeypatch.setattr("derain.export.timing.measure_latency", lambda *_: "times")
+    succeed("export", "default", "--out", "model.onnx")
+    assert exported == [Derainer().spec]
 
 
 @pytest.fixture

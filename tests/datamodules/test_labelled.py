@@ -74,6 +74,7 @@ def test_a_simulated_data_set_brings_its_split_its_card_and_its_rain(simulated) 
         labels = f"set/sequences/{name}/lidar_radar_labels/0.label"
         assert found([simulated], "simulated", part) == [labels]
     assert card_of([simulated], None) == load_card("simulated")
+    assert card_of([Path("example")], None) == load_card("simulated")
     assert rain_rates([simulated], None) == {"000": 0.0, "002": 25.0}
 
 
