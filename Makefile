@@ -29,7 +29,7 @@ types: $(READY)
 	rm -rf build
 	$(PYTHON) -m pip install --quiet --no-deps --no-build-isolation --target build/types .
 	$(VENV)/bin/mypy build/types/derain
-	cd build/types && $(CURDIR)/$(VENV)/bin/lint-imports --no-cache --no-logo --config $(CURDIR)/pyproject.toml
+	cd build/types && $(CURDIR)/$(VENV)/bin/lint-imports --no-cache --no-logo $(CURDIR)/pyproject.toml
 
 # The site in build/site; a warning is an error.
 docs: $(READY)
