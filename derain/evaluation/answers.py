@@ -6,9 +6,9 @@ from dataclasses import astuple, dataclass, field
 import numpy as np
 
 from derain.cards.card import DataCard
-from derain.evaluation.counts import Counts, Mask, RainCounts, band_names, band_of, ratio, table_of
+from derain.evaluation.counts import Counts, RainCounts, band_names, band_of, ratio, table_of
 from derain.evaluation.text_tables import number_text, plain_table
-from derain.scan import Floats, Ints, Scan
+from derain.scan import Bools, Floats, Ints, Scan
 from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
 from derain.views.morton import first_rows
@@ -53,7 +53,7 @@ class Answers:
     table: Ints = field(default_factory=lambda: np.zeros(_SHAPE, np.int64))
 
     @classmethod
-    def of(cls, scan: Scan, card: DataCard, called_rain: Mask | None = None) -> "Answers":
+    def of(cls, scan: Scan, card: DataCard, called_rain: Bools | None = None) -> "Answers":
         """Counts the valid points of one scan.
 
         Args:
@@ -164,7 +164,7 @@ class TruthRecord:
         self.scans = 0
         self.counts = {title: RainCounts(card) for title in titles}
 
-    def add(self, frame: Frame, scan: Scan, *answers: tuple[Mask, Mask]) -> None:
+    def add(self, frame: Frame, scan: Scan, *answers: tuple[Bools, Bools]) -> None:
         """Measures the answers to one scan.
 
         Args:

@@ -12,9 +12,6 @@ from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.scan import Bools, Floats, Ints, Scan
 
-# Which points of a scan of N points, bool (N,).
-Mask = Bools
-
 SCORES = ("precision", "recall", "f1", "iou")
 
 # Where the bands of range start, metres; the last band is open.
@@ -94,7 +91,7 @@ class Counts:
     true_negative: int = 0
 
     @classmethod
-    def of(cls, called_rain: Mask, rain: Mask) -> "Counts":
+    def of(cls, called_rain: Bools, rain: Bools) -> "Counts":
         """Counts points.
 
         Args:
@@ -214,7 +211,7 @@ class RainCounts:
         self.cells = np.zeros((len(self.ids), len(RANGE_EDGES), 2), np.int64)
         self.per_scan: list[Counts] = []
 
-    def add(self, scan: Scan, called_rain: Mask) -> None:
+    def add(self, scan: Scan, called_rain: Bools) -> None:
         """Counts the points of one labelled scan.
 
         Args:
