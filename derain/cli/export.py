@@ -25,7 +25,7 @@ from derain.bags.names import split
 from derain.cli import options
 from derain.cli.method_options import add_runtime, runtime_of
 from derain.cli.outputs import print_lines
-from derain.default import DEFAULT
+from derain.default import DEFAULT, default_checkpoint
 from derain.errors import InputError
 from derain.files.reading import is_file
 from derain.sources.folders import named_frames
@@ -92,7 +92,6 @@ def main(arguments: argparse.Namespace) -> int:
     from derain.export.quantisation import CALIBRATION_SCANS
     from derain.export.timing import measure_latency
     from derain.models.checkpoint import load_model
-    from derain.workflows.start import checkpoint_of
 
     out, scan = arguments.out, arguments.scan
     if scan is not None and not (is_file(scan) or split(scan)):
@@ -104,7 +103,8 @@ def main(arguments: argparse.Namespace) -> int:
             "--int8", "needs --calibration, and that needs it", "Give both or neither."
         )
     runtime = runtime_of(arguments)
-    model = load_model(checkpoint_of(arguments.checkpoint))
+    is_default = arguments.checkpoint == DEFAULT
+    model = load_model(default_checkpoint() if is_default else arguments.checkpoint)
     frames = named_frames(arguments.calibration, arguments.columns).map(
         lambda frame: frame.with_intensity_times(arguments.intensity_scale)
     )

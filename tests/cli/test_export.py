@@ -1,5 +1,6 @@
 """``derain export``: a checkpoint in, a proved and timed ONNX file out, or one line."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +50,15 @@ def test_the_model_that_comes_with_derain_is_exported_by_its_name(
     monkeypatch.setattr("derain.export.timing.measure_latency", lambda *_: "times")
     succeed("export", "default", "--out", "model.onnx")
     assert exported == [Derainer().spec]
+
+
+def test_an_exported_model_is_not_exported_again_as_the_checkpoint_beside_it(
+    refused, checkpoint, onnx_model, here
+) -> None:
+    shutil.copy(checkpoint, "model.ckpt")
+    shutil.copy(onnx_model, "model.onnx")
+    assert "model.onnx: " in refused("export", "model.onnx", "--out", "again.onnx")
+    assert not Path("again.onnx").exists()
 
 
 @pytest.fixture
