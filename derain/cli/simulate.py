@@ -63,6 +63,7 @@ from derain.scan import Scan
 from derain.simulation.campaign import FACILITY_RAIN_RATES, Campaign, Drive, partition
 from derain.simulation.classes import TrackClass
 from derain.simulation.dataset import simulate_track
+from derain.simulation.layouts import LAYOUTS
 from derain.simulation.radar import Radar
 from derain.simulation.rain_field import UniformRain
 from derain.simulation.recorded import rain_on_scan
@@ -72,9 +73,6 @@ from derain.sources.folders import named_frames
 from derain.sources.judging import Failures
 from derain.system.cores import usable_cores
 from derain.system.extras import MATPLOTLIB, OPEN3D, require
-
-# The names of derain.simulation.layouts, that of the default first.
-LAYOUT_NAMES = ("facility", "street", "city", "country", "motorway", "garage", "yard", "room")
 
 # Options of a data set, and what each is where it is not given.
 DATA_SET_DEFAULTS: dict[str, Any] = {
@@ -116,7 +114,7 @@ def _add_data_set_options(group: "argparse._ArgumentGroup") -> None:
     default = {name: f"(default: {value})" for name, value in DATA_SET_DEFAULTS.items()}
     group.add_argument(
         "--layout",
-        choices=LAYOUT_NAMES,
+        choices=LAYOUTS,
         help=f"a test track under sprinklers, or random places in even rain {default['layout']}",
     )
     group.add_argument("--sequences", type=count, help=f"sequences {default['sequences']}")

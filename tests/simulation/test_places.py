@@ -5,7 +5,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from derain.cli.simulate import LAYOUT_NAMES
 from derain.scan import Floats, Ints
 from derain.simulation.classes import TrackClass
 from derain.simulation.layouts import LAYOUTS
@@ -58,10 +57,6 @@ def seen(place: str) -> tuple[Floats, Ints]:
         ends.append((SENSOR.beams() * returns.range[:, None])[returns.returned])
         labels.append(returns.label[returns.returned])
     return np.concatenate(ends), np.concatenate(labels)
-
-
-def test_the_command_knows_every_layout() -> None:
-    assert set(LAYOUT_NAMES) == set(LAYOUTS)
 
 
 @pytest.mark.parametrize("place", LAYOUTS)
