@@ -101,14 +101,10 @@ def intensity_name(subject: str | Path, names: Iterable[str]) -> str | None:
 def _numbers(
     fields: Mapping[str, NDArray[Any]], *axes: int, kinds: str = "iuf"
 ) -> dict[str, NDArray[Any]]:
-    """The columns that hold numbers and have one of these numbers of axes; (N, 1) becomes (N,)."""
-    columns = {
-        name: column[:, 0] if column.shape[1:] == (1,) else column
-        for name, column in fields.items()
-    }
+    """The columns that hold numbers and have one of these numbers of axes."""
     return {
         name: column
-        for name, column in columns.items()
+        for name, column in fields.items()
         if column.dtype.kind in kinds and column.ndim in axes
     }
 

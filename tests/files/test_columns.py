@@ -95,13 +95,16 @@ def test_truth_values_tell_which_points_are_of_the_radar(tmp_path) -> None:
 
 
 def test_a_field_of_one_value_in_brackets_is_a_column(tmp_path) -> None:
-    points = np.ones(3, [(name, "f4", (1,)) for name in ("x", "y", "z", "intensity")])
-    points["intensity"] = [[1], [2], [3]]
+    points = np.ones(3, [(name, "f4", (1,)) for name in ("x", "y", "z", "intensity", "doppler")])
+    points["intensity"] = points["doppler"] = [[1], [2], [3]]
     np.save(tmp_path / "scan.npy", points)
-    scan = read_scan(tmp_path / "scan.npy")
-    assert scan.intensity.tolist() == [1, 2, 3]
-    write_scan(tmp_path / "copy.npy", scan)
+    np.savez(tmp_path / "scan.npz", points)
+    for suffix in (".npy", ".npz"):
+        scan = read_scan(tmp_path / f"scan{suffix}")
+        assert scan.intensity.tolist() == scan.channel("doppler").tolist() == [1, 2, 3]
+        write_scan(tmp_path / f"copy{suffix}", scan)
     assert (tmp_path / "copy.npy").read_bytes() == (tmp_path / "scan.npy").read_bytes()
+    assert np.load(tmp_path / "copy.npz")["arr_0"].dtype == points.dtype
 
 
 def written(path: Path, names: tuple[str, ...]) -> Path:

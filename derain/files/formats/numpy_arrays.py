@@ -3,7 +3,7 @@
 import io
 import math
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,9 +24,15 @@ _MEMBER = b"PK\x01\x02"
 
 @dataclass(frozen=True)
 class NpyHeader:
-    """The layout of the columns of a .npy file: as named fields, or side by side without names."""
+    """The layout of the columns of a .npy file.
+
+    Attributes:
+        structured: True if they are named fields, and not side by side without names.
+        as_columns: Names of the fields that the file holds as (N, 1).
+    """
 
     structured: bool
+    as_columns: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -70,7 +76,8 @@ class Npy(Format):
         array = _array(content.data)
         shape = _organised(content.path, _grid_of_table(array))
         fields = _columns_of_table(content.path, array, columns)
-        return scan_of(content.path, fields, shape, NpyHeader(structured=bool(array.dtype.names)))
+        header = NpyHeader(bool(array.dtype.names), _fields_as_columns(array))
+        return scan_of(content.path, fields, shape, header)
 
     def names_columns(self, scan: Scan) -> bool:
         """A structured array does."""
@@ -82,9 +89,10 @@ class Npy(Format):
         Columns of one dtype become an array (N, C), unless the scan comes from a structured one;
         columns of several become a structured array. Organised clouds stay organised.
         """
-        named = self.names_columns(scan)
-        columns = scan.fields if named else columns_of(scan)
-        return _to_bytes(_gridded(scan, _table(columns, named)))
+        if isinstance(scan.header, NpyHeader) and scan.header.structured:
+            columns = _as_in_file(scan.fields, scan.header.as_columns)
+            return _to_bytes(_gridded(scan, _table(columns, structured=True)))
+        return _to_bytes(_gridded(scan, _table(columns_of(scan), structured=False)))
 
 
 @FORMATS.add(".npz")
@@ -116,10 +124,12 @@ class Npz(Format):
         grid = _grid(path, arrays) if table is None else _grid_of_table(arrays[table])
         shape = _organised(path, grid)
         fields, constants, structured = dict[str, NDArray[Any]](), {}, False
+        as_columns = set[str]()
         if table is not None:
             structured = bool(arrays[table].dtype.names)
+            as_columns |= _fields_as_columns(arrays[table])
             fields = _columns_of_table(path, arrays.pop(table), columns)
-        stated, as_columns = tuple(fields), set[str]()
+        stated = tuple(fields)
         for name, array in arrays.items():
             if name in stated:
                 raise InputError(path, f"has an array {name} beside a column {name}", "Rename one.")
@@ -139,15 +149,14 @@ class Npz(Format):
 
     def encode(self, path: Path, scan: Scan) -> bytes:
         """A scan's columns as named arrays, compressed. Organised clouds stay organised."""
-        columns = dict(scan.fields or columns_of(scan))
         header = scan.header if isinstance(scan.header, NpzHeader) else NpzHeader({})
+        columns = _as_in_file(scan.fields or columns_of(scan), header.as_columns)
         arrays: dict[str, NDArray[Any]] = {}
         if header.table is not None and columns.keys() >= set(header.columns):
             table = {name: columns.pop(name) for name in header.columns}
             arrays[header.table] = _gridded(scan, _table(table, header.structured))
         for name, column in columns.items():
-            as_columns = name in header.as_columns and column.ndim == 1
-            arrays[name] = _gridded(scan, column[:, np.newaxis] if as_columns else column)
+            arrays[name] = _gridded(scan, column)
         arrays |= header.constants
         file = io.BytesIO()
         # Not numpy.savez, which cannot write an array named "file".
@@ -200,6 +209,22 @@ def _arrays(content: Content) -> dict[str, NDArray[Any]]:
     return arrays
 
 
+def _fields_as_columns(array: NDArray[Any]) -> frozenset[str]:
+    """Names of the fields of a structured array that have the shape (1,)."""
+    names = array.dtype.names or ()
+    return frozenset(name for name in names if array.dtype[name].shape == (1,))
+
+
+def _as_in_file(
+    columns: Mapping[str, NDArray[Any]], as_columns: Collection[str]
+) -> dict[str, NDArray[Any]]:
+    """Columns of a scan, those that the file holds as (N, 1) in that shape."""
+    return {
+        name: column[:, np.newaxis] if name in as_columns and column.ndim == 1 else column
+        for name, column in columns.items()
+    }
+
+
 def _table(columns: Mapping[str, NDArray[Any]], structured: bool) -> NDArray[Any]:
     """Columns as one array: numbers (N, C) if all are of one dtype, else structured (N,)."""
     dtypes = {column.dtype for column in columns.values()}
@@ -213,7 +238,7 @@ def _table(columns: Mapping[str, NDArray[Any]], structured: bool) -> NDArray[Any
 def _columns_of_table(
     path: Path, array: NDArray[Any], columns: Sequence[str]
 ) -> dict[str, NDArray[Any]]:
-    """The columns of an array of numbers or a structured one, each (N,).
+    """The columns of an array of numbers or a structured one, (N,); fields of more axes keep them.
 
     Raises:
         InputError: Another number of columns than names, or points that lie side by side.
@@ -221,7 +246,8 @@ def _columns_of_table(
     """
     if names := array.dtype.names:
         flat = array.reshape(-1)
-        return {name: flat[name] for name in names}
+        as_columns = _fields_as_columns(array)
+        return {name: flat[name][:, 0] if name in as_columns else flat[name] for name in names}
     points = math.prod(array.shape[:-1])
     if has_points_as_columns(points, array.shape[-1]):
         remedy = "Write the array with a row for each point, such as its transpose."
