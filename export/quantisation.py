@@ -68,7 +68,8 @@ def quantised(
     with tempfile.TemporaryDirectory() as folder:
         # By way of files: quantize_static moves the tensors out of a model that it is given.
         given, path = Path(folder) / "float32.onnx", Path(folder) / "int8.onnx"
-        # It is optimised already; what it gains are the shapes, and onnxruntime's leave to go on.
+        # onnxruntime warns of a model that this did not prepare. The model is optimised already: it
+        # gains only the shapes of its tensors.
         quant_pre_process(proto, given, skip_optimization=True, skip_symbolic_shape=True)
         quantize_static(
             given,

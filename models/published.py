@@ -87,7 +87,7 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
             placeholders = [(Placeholder, name) for name in TRAINER_STATE]
             with (
                 safe_globals([dict, defaultdict, *placeholders]),
-                warnings.catch_warnings(action="ignore"),  # of what is refused, too
+                warnings.catch_warnings(action="ignore"),  # torch also warns of what it refuses
             ):
                 content = torch.load(file, map_location="cpu", weights_only=True)
         except Exception as error:  # torch.load raises what its parts raise, zip's own included

@@ -273,7 +273,9 @@ def crowding_far_off(rays: Rays) -> float:
 
 
 def range_step(rays: Rays) -> float:
-    """Change of range from one ray of a beam to the next beyond RANGE_NOISE: the median share.
+    """Median change of range from one ray of a beam to the next, as a share of the nearer range.
+
+    RANGE_NOISE is taken off each change.
 
     Args:
         rays: Azimuth, inclination and range of points, as :func:`rays_near_axes` gives them; of
