@@ -161,6 +161,8 @@ def tune_filter(
             shared.finish(trial, pooled_iou(filter_from(name, trial.params), labelled))
             after_trial()
         parameters, iou = shared.best()
+    except BrokenPipeError:  # the pipe that after_trial prints to, not the storage
+        raise
     except (optuna.exceptions.OptunaError, SQLAlchemyError, OSError) as error:
         if storage is None:
             raise

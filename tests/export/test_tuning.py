@@ -150,6 +150,17 @@ def test_a_journal_that_can_no_longer_grow_is_named(seen, tmp_path, full_disk) -
         tune("ror", seen, 2, journal)
 
 
+def test_a_closed_pipe_that_progress_is_printed_to_is_not_called_a_fault_of_the_journal(
+    seen, tmp_path
+) -> None:
+    def print_progress() -> None:
+        raise BrokenPipeError
+
+    storage = Storage(str(tmp_path / "study.journal"))
+    with pytest.raises(BrokenPipeError):
+        tune_filter("ror", dict(enumerate(seen)), 1, 0, storage, print_progress)
+
+
 # Two of them are neighbours: nothing lies midway.
 PROBABILITIES = np.array([0, 0.1, np.nextafter(np.float32(0.1), 1), 0.5, 1], np.float32).tolist()
 
