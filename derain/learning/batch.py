@@ -115,9 +115,9 @@ class Batch:
             target = target.to(device, non_blocking=non_blocking)
         return replace(self, inputs=inputs, target=target)
 
-    def split(self, scores: Tensor) -> list[Tensor]:
-        """Takes scores of all cells, (M, ...), apart into those of each scan."""
-        return list(torch.split(scores, list(self.cells)))
+    def split(self, values: Tensor) -> list[Tensor]:
+        """Takes values of all cells, (M, ...), such as scores, apart into those of each scan."""
+        return list(torch.split(values, list(self.cells)))
 
 
 def summed_times(parts: Sequence[Mapping[str, float]]) -> dict[str, float]:
