@@ -118,7 +118,8 @@ class McapFile:
         """Messages in the order of their times; of one time, in the order of the file.
 
         Args:
-            channels: Those of interest. Where they are all, no message may be left out.
+            channels: Those of interest. If they are all of the file, a message of a channel that it
+                does not define is damage, and is not left out.
             start: The first time of interest, nanoseconds.
 
         Raises:
