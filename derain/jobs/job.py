@@ -183,7 +183,7 @@ class JobStatus:
         done: Number of units that are done.
         failed: Records of the units that failed.
         missing: The units without a record.
-        seconds: Time that the units took, by worker.
+        seconds: Time that the units that are done took, by worker.
     """
 
     job: Job
@@ -222,11 +222,11 @@ def job_status(folder: Place, on_done: Callable[[Record], None]) -> JobStatus:
         if record is None:
             missing.append(unit)
             continue
-        seconds[record.worker] += record.seconds
         if record.errors:
             failed.append(record)
-        else:
-            on_done(record)
+            continue
+        seconds[record.worker] += record.seconds
+        on_done(record)
     done = len(units) - len(failed) - len(missing)
     return JobStatus(job, units, done, failed, missing, seconds)
 

@@ -76,6 +76,19 @@ def test_shares_are_those_of_a_slurm_array_and_the_status_names_what_is_missing(
     assert "3 of 3 units done, 0 failed, 0 missing" in succeed("status", out).out
 
 
+def test_the_time_of_units_that_failed_slows_no_worker_down(
+    run_derain, succeed, scans, tmp_path
+) -> None:
+    (scans / "000003.bin").write_bytes(b"broken")
+    run_derain("run", "dror", scans, "--out", tmp_path / "out", *OPTIONS)
+    status = json.loads(run_derain("status", tmp_path / "out", "--json").out)
+    (seconds,) = status["seconds_by_worker"].values()
+    assert list(status["failed"]) == ["000002"]
+    records = tmp_path / "out/.derain/units"
+    done = [json.loads((records / f"{unit}.json").read_text()) for unit in ("000000", "000004")]
+    assert seconds == sum(record["seconds"] for record in done)
+
+
 def test_options_that_exclude_each_other_are_refused(refused, scans, tmp_path) -> None:
     command = ("run", "dror", scans, "--out", tmp_path / "out")
     assert "--anew" in refused(*command, "--anew", "--shard", "0/2")
