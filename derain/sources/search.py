@@ -87,7 +87,11 @@ def recordings_below(
         directly in it, or a data set or a part of one: :func:`named_frames` takes these whole.
     """
     takes_none = layouts is not None and not layouts
-    if takes_none or not os.path.isdir(folder) or _holds_scans(folder) or bags_at(folder):
+    if takes_none or not os.path.isdir(folder) or _holds_scans(folder):
+        return []
+    if bags := bags_at(folder):
+        # Among folders that are bags, one that lacks its metadata looks like any other.
+        _warn_of_others_beside(folder, _Search(folder, layouts, [*results, *bags]))
         return []
     if scans := _laid_out(folder, layouts):
         whole = Path(os.path.realpath(folder))
@@ -108,7 +112,7 @@ def _laid_out(root: Path, layouts: Sequence[Layout] | None) -> list[Path]:
 
 
 def _warn_of_others_beside(folder: Path, search: "_Search") -> None:
-    """Warns of recordings beside sequences that lie directly in a folder."""
+    """Warns of recordings beside the bags or sequences that lie directly in a folder."""
     if others := [*search.inside(folder)]:
         recordings = (
             "1 other recording" if len(others) == 1 else f"{len(others):,} other recordings"

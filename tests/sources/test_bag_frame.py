@@ -148,3 +148,15 @@ def test_what_is_passed_over_beside_bags_is_counted(tmp_path, capsys) -> None:
     (tmp_path / "scan.csv").touch()
     named_frames([tmp_path])
     assert f"{tmp_path}: 1 .csv passed over" in capsys.readouterr().err
+
+
+def test_recordings_beside_bags_are_warned_of(tmp_path, capsys) -> None:
+    small_bag(tmp_path, "mcap")
+    named_frames([tmp_path])
+    assert "other recording" not in capsys.readouterr().err
+    (cut_off := tmp_path / "cut_off").mkdir()
+    (cut_off / "cut_off_0.mcap").touch()  # the metadata are written when a recording ends
+    assert len(named_frames([tmp_path])) == len(tables())
+    warned = capsys.readouterr().err
+    assert "1 other recording" in warned
+    assert str(cut_off) in warned
