@@ -1,5 +1,6 @@
 """Point clouds in bags as frames."""
 
+import os
 import re
 from dataclasses import dataclass, replace
 from functools import partial
@@ -42,7 +43,7 @@ class BagFrame(FileFrame):
     @property
     def label_beside_bag(self) -> Path:
         """Path of its labels: ``drive.labels/000012.label`` beside the bag."""
-        bag = self.clouds.bag.path
+        bag = Path(os.path.abspath(self.clouds.bag.path))  # the name of `.` is empty
         return bag.with_name(stem(bag) + LABELS_SUFFIX) / f"{self.cloud_number:06d}{LABEL}"
 
     @property

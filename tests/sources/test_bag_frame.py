@@ -48,6 +48,17 @@ def test_frames_are_the_clouds_in_order(tmp_path, storage) -> None:
         assert frame.count_points() == len(table)
 
 
+@pytest.mark.parametrize("named", [".", "../drive", "inner/.."])
+def test_a_bag_is_the_folder_that_a_command_runs_in(tmp_path, monkeypatch, named) -> None:
+    bag = small_bag(tmp_path, "mcap")
+    (bag / "inner").mkdir()
+    write_labels(tmp_path / "drive.labels/000001.label", np.ones(len(tables()[1])))
+    monkeypatch.chdir(bag)
+    frames = named_frames(named, labelled=True)
+    assert [frame.has_labels for frame in frames] == [False, True, False]
+    assert {frame.sequence for frame in frames} == {"drive"}
+
+
 def test_a_cloud_without_a_stamp_was_taken_when_it_was_recorded(tmp_path) -> None:
     ros = Ros("mcap")
     cloud = ros.cloud(tables(1)[0], 0)
