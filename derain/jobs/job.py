@@ -93,7 +93,7 @@ class Job:
             raise InputError(
                 named,
                 "holds no records of a job",
-                "Name the --out folder of a run over several recordings.",
+                "Name the --out folder of a run over many scans, or of one with --resume.",
             )
         try:
             read = json.loads(content)
