@@ -123,16 +123,18 @@ def weather_table(path: Path | None, results: Iterable[Path]) -> Iterator[list[S
         results: Files that the block may write.
 
     Raises:
-        InputError: Some other file is or will be there, or the file cannot be written.
+        InputError: Some other file or a folder is or will be there, or the file cannot be written.
     """
     rows: list[Sequence[object]] = []
     if path is None:
         yield rows
         return
     remedy = "Give --weather another file."
-    namesakes = (result for result in results if result.name == path.name)
+    inside = (result for result in results if path.name in result.parts)
+    places = (place for result in inside for place in (result, *result.parents))
+    namesakes = (place for place in places if place.name == path.name)
     if os.path.realpath(path) in map(os.path.realpath, namesakes):
-        raise InputError(path, "is a file of the results", remedy)
+        raise InputError(path, "is a file or a folder of the results", remedy)
     lines = 0
     if is_file(path):
         with reading(path), path.open("rb") as file:

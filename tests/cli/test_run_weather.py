@@ -179,7 +179,7 @@ def test_a_table_takes_the_place_of_no_result_and_of_no_other_file(
     scan = recording / "000003.bin"
     before = scan.read_bytes()
     folders = ("--out", tmp_path / "out", "--removed", tmp_path / "rain")
-    results = ("out/000003.bin", "out/000003.label", "rain/000003.bin")
+    results = ("out", "out/000003.bin", "out/000003.label", "rain", "rain/000003.bin")
     for path in (scan, *(tmp_path / name for name in results)):
         assert f"{path}: " in refused("run", "dror", recording, *folders, "--weather", path)
     assert scan.read_bytes() == before
