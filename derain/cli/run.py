@@ -63,7 +63,7 @@ from derain.cli.weather_options import (
     weather_table,
 )
 from derain.default import DEFAULT, model_card
-from derain.errors import InputError
+from derain.errors import InputError, printable
 from derain.example import Truth
 from derain.export.methods import DELAY, PAST, over_recording
 from derain.export.runtime import Derainer
@@ -277,7 +277,7 @@ class _Printer(CleaningObserver):
         scan = outcome.figures
         if scan.weather is not None and (measured := outcome.measured) is not None:
             row = weather_row(scan.weather, measured)
-            self._rows.append([scan.scan, outcome.seconds, *row])
+            self._rows.append([printable(scan.scan), outcome.seconds, *row])
 
     def failed(self, error: InputError) -> None:
         """Prints the error of a scan that is not cleaned."""

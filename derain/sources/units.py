@@ -1,5 +1,6 @@
 """The units that a source splits into: recordings, bags, or blocks of scans of long recordings."""
 
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -212,11 +213,11 @@ def _unit(recording: Sequence[Frame], begin: int, end: int, window: Window) -> F
     frames = tuple(recording[begin:end])
     before = tuple(recording[max(begin - window.before, 0) : begin])
     after = tuple(recording[end : end + window.after])
-    seen = (*before, *frames, *after)
+    stamps = os.fsencode("\n".join(map(_stamp, (*before, *frames, *after))))
     return FrameUnit(
         id=frames[0].key,
         size=sum(map(_size, frames)),
-        inputs=sha256("\n".join(map(_stamp, seen)).encode()).hexdigest()[:16],
+        inputs=sha256(stamps).hexdigest()[:16],
         frames=frames,
         before=before,
         after=after,

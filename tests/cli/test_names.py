@@ -64,6 +64,17 @@ def test_odd_names_are_fit_for_a_terminal_and_whole_in_json(succeed, scans, comm
     assert written in (set(), {path.name for path in scans})
 
 
+def test_records_and_tables_take_odd_names(succeed, scans) -> None:
+    command = ("run", "dror", scans[0].parent, "--out", "out", "--weather", "weather.csv")
+    for _ in range(2):
+        outcome = succeed(*command, "--resume")
+        rows = Path("weather.csv").read_text("utf-8").splitlines()
+        assert len(rows) == 1 + len(scans)
+        assert_fit_for_a_terminal("\n".join(rows))
+    assert f"({len(scans)} of them done before)" in outcome.out
+    assert_fit_for_a_terminal(succeed("info", scans[0].parent).out)
+
+
 def test_what_is_written_of_odd_names_is_text(succeed, scans) -> None:
     data = ["--data", scans[0].parent, "--card", "wads"]
     title = os.fsdecode(b"\xfftitle\x1b[1m=dror")
