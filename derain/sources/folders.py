@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import chain, islice
+from itertools import chain, groupby, islice
 from pathlib import Path
 
 from derain.bags.names import bags_at, is_bag, split, stem
@@ -188,26 +188,40 @@ def source_of(
         return scans
     given: Iterable[object]
     given = [scans] if isinstance(scans, Scan | Frame | str | Path) else scans
+    here = [Path(folder) for folder in results if not is_url(folder)]
     frames: list[Frame] = []
-    for place, item in enumerate(given):
-        match item:
-            case Frame():
-                frames.append(item)
-            case Scan():
-                frames.append(MemoryFrame(key=f"{place:06d}", number=place, scan=item))
-            case str() if is_url(item):
-                from derain.sources.store_listing import frames_at
+    # Files are taken together, for only then those of one folder are a recording.
+    for kind, group in groupby(enumerate(given), lambda numbered: _kind_of(numbered[1])):
+        numbers, items = zip(*group, strict=True)
+        if kind == "url":
+            from derain.sources.store_listing import frames_at
 
-                frames += frames_at([item], columns, results=results)
-            case str() | Path():
-                here = [Path(folder) for folder in results if not is_url(folder)]
-                frames += named_frames(item, columns, labelled=True, results=here)
-            case _:
-                reason = f"{type(item).__name__} is no scan"
-                raise InputError("scans", reason, "Give Scans, or paths of files and folders.")
+            frames += frames_at(items, columns, results=results)
+        elif kind == "path":
+            frames += named_frames(items, columns, labelled=True, results=here)
+        else:
+            frames += map(_frame_in_memory, numbers, items)
     if not frames:
         raise InputError("scans", "there are none", "Give one or more.")
     return Frames(frames)
+
+
+def _kind_of(item: object) -> str:
+    """What an item that a program passes is: a ``url``, a ``path``, or an ``object``."""
+    if isinstance(item, str | Path):
+        return "url" if is_url(item) else "path"
+    return "object"
+
+
+def _frame_in_memory(place: int, item: object) -> Frame:
+    """The frame of a scan in memory, or the frame that is passed; errors as for `source_of`."""
+    match item:
+        case Frame():
+            return item
+        case Scan():
+            return MemoryFrame(key=f"{place:06d}", number=place, scan=item)
+    reason = f"{type(item).__name__} is no scan"
+    raise InputError("scans", reason, "Give Scans, or paths of files and folders.")
 
 
 def frame_of(

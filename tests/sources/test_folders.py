@@ -2,6 +2,7 @@
 
 import string
 from collections import Counter
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -167,6 +168,14 @@ def test_scans_frames_and_paths_stand_in_the_order_they_are_given(tmp_path) -> N
     assert [each.key for each in source] == ["000000", "0", "1", "framed", "1"]
     np.testing.assert_array_equal(source[1].read_label(10), np.arange(10))
     assert source_of(source) is source
+
+
+def test_files_that_a_program_lists_are_a_recording(tmp_path) -> None:
+    paths = [tmp_path / f"{number}.bin" for number in range(3)]
+    touch(*paths)
+    source = source_of([*paths[:2], str(paths[2])])
+    assert [frame.number for frame in source] == [0, 1, 2]
+    assert all(after.follows(before) for before, after in pairwise(source))
 
 
 def test_wide_files_are_read_by_the_columns_that_are_named(tmp_path) -> None:
