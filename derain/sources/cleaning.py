@@ -125,9 +125,9 @@ def clean(
         InputError: No scans, or a folder whose files would be overwritten; records of other options
             in the folder; an executor that has ended.
     """
-    if isinstance(method, str | Path):
+    if not hasattr(method, "push"):
         remedy = "Give derain.Derainer(...) or derain.FilterDerainer(...)."
-        raise InputError(method, "is the name of a method, and not a method", remedy)
+        raise InputError("method", f"{type(method).__name__} is no method", remedy)
     source = source_of(source, results=[] if isinstance(sink, CleanSink) else [sink])
     monitor = WeatherMonitor(weather, source, knows_recordings=placing is None)
     sample = None if weather.every_scan else monitor.sample

@@ -48,7 +48,8 @@ def test_a_scan_that_cannot_be_read_is_reported_and_the_others_are_cleaned(tmp_p
         assert (scan.rain, len(derain.read_scan(out / path.name))) == (rain.sum(), 200 - rain.sum())
 
 
-def test_a_name_is_no_method(tmp_path) -> None:
+@pytest.mark.parametrize("given", ["dror", derain.DROR()])
+def test_a_name_and_a_filter_alone_are_no_methods(tmp_path, given) -> None:
     scans = write_scenes(tmp_path / "scans", 200, name="{}.bin")
-    with pytest.raises(derain.InputError, match="name of a method"):
-        derain.clean(scans, "dror", tmp_path / "out")
+    with pytest.raises(derain.InputError, match=f"{type(given).__name__} is no method"):
+        derain.clean(scans, given, tmp_path / "out")
