@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.files.labels import write_labels
+from derain.scan import Ints
 
 KEPT = Path(__file__).parent / "export" / "kept"
 
@@ -14,7 +15,7 @@ KEPT = Path(__file__).parent / "export" / "kept"
 BUILDING, FALLING_SNOW = 50, 110
 
 
-def wall_and_drops() -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+def wall_and_drops() -> tuple[NDArray[np.float32], Ints]:
     """A scan in which every filter finds the rain and nothing else, and its labels.
 
     Returns:

@@ -1,8 +1,8 @@
 """What a sensor of two returns would record, and which of its returns are of one ray."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from derain.scan import Bools, Ints
 from derain.simulation.sensor import unit_vectors
 from derain.views.return_columns import LEAST_APART
 
@@ -34,7 +34,7 @@ class Recording:
         unit = unit_vectors(*directions[self.ray].T)
         self.xyz = (unit * self.distance[:, None]).astype(np.float32)
 
-    def truth(self) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]:
+    def truth(self) -> tuple[Ints, Bools, Bools]:
         """Row of the other return of each row's ray, and which are the nearer and the farther."""
         order = np.lexsort((self.distance, self.ray))
         first = np.flatnonzero(self.ray[order][1:] == self.ray[order][:-1])

@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from derain.annotation.scene import Box, Scene
 from derain.annotation.steps import MOST_POINTS, Plane, annotate, road_plane
 from derain.errors import InputError
 from derain.fusion import UNKNOWN
-from derain.scan import Scan
+from derain.scan import Floats, Scan
 from derain.simulation.classes import TrackClass
 
 PLANE = Plane((0.0, 0.0, 1.0), 1.5)
@@ -23,9 +22,7 @@ SCENE = Scene(
 )
 
 
-def road(
-    points: int, slope: tuple[float, float] = (0.0, 0.0), seed: int = 0
-) -> NDArray[np.float64]:
+def road(points: int, slope: tuple[float, float] = (0.0, 0.0), seed: int = 0) -> Floats:
     """A road 1.5 m under the sensor, measured to a centimetre, float64 (points, 3)."""
     generator = np.random.default_rng(seed)
     x, y = generator.uniform(2, 60, points), generator.uniform(-4, 4, points)
@@ -33,7 +30,7 @@ def road(
     return np.column_stack([x, y, z])
 
 
-def plane_of(points: NDArray[np.float64]) -> Plane:
+def plane_of(points: Floats) -> Plane:
     return road_plane([Scan.of(points, "scan")], Scene(((-9, -9), (99, -9), (99, 99), (-9, 99))))
 
 

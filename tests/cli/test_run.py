@@ -12,7 +12,7 @@ from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
 from derain.files import read_scan, write_scan
 from derain.filters import DROR, DSOR, FilterDerainer
-from derain.scan import Scan
+from derain.scan import Bools, Ints, Scan
 from derain.views.spherical_grid import SphericalGrid
 
 
@@ -26,7 +26,7 @@ def scans(tmp_path) -> Path:
     return folder
 
 
-def rain_in(out: Path, stem: str = "scan") -> NDArray[np.bool_]:
+def rain_in(out: Path, stem: str = "scan") -> Bools:
     return np.fromfile(out / f"{stem}.label", "<u4").astype(bool)
 
 
@@ -190,7 +190,7 @@ def test_a_scan_is_projected_once_and_points_outside_the_grid_are_warned_of(
     points.tofile(tmp_path / "scan.bin")
     projected, pixel = [], SphericalGrid.pixel
 
-    def counting(grid: SphericalGrid, xyz: NDArray[np.float32]) -> NDArray[np.int64]:
+    def counting(grid: SphericalGrid, xyz: NDArray[np.float32]) -> Ints:
         projected.append(len(xyz))
         return pixel(grid, xyz)
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from derain.cli.main import BROKEN_PIPE
 from derain.cli.weather_options import weather_table
 from derain.files import read_scan
+from derain.scan import Floats
 from derain.weather.alarm import Alarm, Threshold
 from derain.weather.scan_weather import ScanWeather
 
@@ -57,7 +58,7 @@ def objects(text: str) -> list[dict[str, Any]]:
     return [json.loads(line)["weather"] for line in text.splitlines()]
 
 
-def rounded(shares: NDArray[np.float64]) -> list[Any]:
+def rounded(shares: Floats) -> list[Any]:
     return [None if np.isnan(share) else round(float(share), 5) for share in shares]
 
 

@@ -13,16 +13,16 @@ from derain.datamodules.user_changes import (
     changed_as_by_users,
 )
 from derain.evaluation.hard_cases import scene
-from derain.scan import Scan
+from derain.scan import Floats, Scan
 
 
 def street() -> Scan:
     return Scan.of(scene(2000)).with_label(np.arange(2000))
 
 
-def directions(xyz: NDArray[np.float32]) -> NDArray[np.float64]:
+def directions(xyz: NDArray[np.float32]) -> Floats:
     wide = xyz.astype(np.float64)
-    directions: NDArray[np.float64] = wide / np.linalg.norm(wide, axis=1, keepdims=True)
+    directions: Floats = wide / np.linalg.norm(wide, axis=1, keepdims=True)
     return directions
 
 

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from derain.cards.card import DataCard
 from derain.evaluation.answers import (
@@ -19,7 +18,7 @@ from derain.evaluation.answers import (
 )
 from derain.evaluation.counts import Counts
 from derain.evaluation.hard_cases import scene
-from derain.scan import Scan
+from derain.scan import Bools, Ints, Scan
 from derain.sources.frame import MemoryFrame
 
 
@@ -90,7 +89,7 @@ EVERY = np.ones(len(TRUTH), bool)
 FRAME = MemoryFrame(key="0", scan=Scan.of(scene(len(TRUTH))).with_label(TRUTH))
 
 
-def record_of(card: DataCard, rows: NDArray[np.int64], sure: NDArray[np.bool_]) -> TruthRecord:
+def record_of(card: DataCard, rows: Ints, sure: Bools) -> TruthRecord:
     """A record of one scan that has these rows of the points above."""
     record, scan = TruthRecord(card), FRAME.scan.take(rows)
     answers = (CALLED[rows], EVERY[rows]), (CALLED[rows], sure[rows])

@@ -4,17 +4,16 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from derain.evaluation.baselines import IntensityRule, PositionPrior, all_points, no_points
 from derain.evaluation.counts import Counts
 from derain.evaluation.hard_cases import hard_cases
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 
-Truth = tuple[Scan, NDArray[np.bool_]]
+Truth = tuple[Scan, Bools]
 
 
-def iou(predicted: NDArray[np.bool_], rain: NDArray[np.bool_]) -> float:
+def iou(predicted: Bools, rain: Bools) -> float:
     return Counts.of(predicted, rain).iou
 
 
@@ -68,7 +67,7 @@ def test_hard_scans_get_an_answer_and_points_that_cannot_be_judged_teach_nothing
         assert rule == IntensityRule.best(valid), name
 
 
-def random_scan(seed: int, points: int, levels: int = 1000) -> tuple[Scan, NDArray[np.bool_]]:
+def random_scan(seed: int, points: int, levels: int = 1000) -> tuple[Scan, Bools]:
     """Points of so many different ranges and intensities, and their rain: more of the near."""
     generator = np.random.default_rng(seed)
     columns = np.zeros((points, 4))

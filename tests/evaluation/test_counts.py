@@ -12,7 +12,6 @@ import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from sklearn import metrics
 
 from derain.cards.card import DataCard
@@ -21,7 +20,7 @@ from derain.evaluation.counts import SCORES, ClassCounts, Counts, RainCounts, me
 from derain.evaluation.metrics import RainMetrics
 from derain.evaluation.ray_counts import RayCounts
 from derain.evaluation.text_tables import markdown_table, number_text, plain_table
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.views.returns import pair_returns
 
 from ..two_returns import Recording
@@ -49,7 +48,7 @@ def test_a_mean_over_scans_leaves_out_scans_without_the_score() -> None:
     assert math.isnan(mean_over_scans(scans[1:2], "iou"))
 
 
-def labelled(seed: int, points: int) -> tuple[Scan, NDArray[np.bool_]]:
+def labelled(seed: int, points: int) -> tuple[Scan, Bools]:
     """A scan with points on the edges of bands and points without a return, and an answer."""
     random = np.random.default_rng(seed)
     xyz = random.uniform(-90, 90, (points, 3)).astype(np.float32)
@@ -59,7 +58,7 @@ def labelled(seed: int, points: int) -> tuple[Scan, NDArray[np.bool_]]:
     return Scan(xyz).with_label(label), np.isin(label, RAIN) ^ (random.random(points) < 0.3)
 
 
-def reference(truth: NDArray[np.bool_], called: NDArray[np.bool_]) -> list[float]:
+def reference(truth: Bools, called: Bools) -> list[float]:
     """The four scores as scikit-learn computes them, which takes no empty arrays."""
     if not len(truth):
         return [math.nan] * 4

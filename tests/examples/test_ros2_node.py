@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
+from derain.scan import Bools
 
 from .hard_points import KEPT
 from .made_up_ros import (
@@ -98,7 +99,7 @@ def test_a_cloud_that_would_lose_too_much_goes_out_whole(
     assert published == [stay, 200 - stay]
 
 
-def calling_rain(patch: pytest.MonkeyPatch, ros2_node: ModuleType, rain: NDArray[np.bool_]) -> None:
+def calling_rain(patch: pytest.MonkeyPatch, ros2_node: ModuleType, rain: Bools) -> None:
     """Has the model call these points rain."""
     usual = Derainer.judge
     patch.setattr(

@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
-from numpy.typing import NDArray
 
 from derain.cards.card import DataCard
 from derain.errors import InputError
@@ -23,7 +22,7 @@ from derain.export.tuning import (
     tune_threshold,
 )
 from derain.filters import FILTERS, FilterDerainer, PointFilter, Span, filter_from
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.views.neighbours import Neighbourhoods
 
 CARD = DataCard("made up", {0: "solid", 3: "rain", 9: "unknown"}, rain=(3,), unknown=(9,))
@@ -90,7 +89,7 @@ class Near(PointFilter):
     neighbours: int = 15
     reach: float = 5.0
 
-    def judge(self, view: Neighbourhoods) -> NDArray[np.bool_]:
+    def judge(self, view: Neighbourhoods) -> Bools:
         return view.distances[:, self.neighbours - 1] < self.reach
 
 

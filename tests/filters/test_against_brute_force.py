@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from derain.evaluation.hard_cases import scene
 from derain.filters import DROR, DSOR, ROR, SOR, SSR, FilterDerainer, PointFilter, filter_view
 from derain.filters.radius_filters import has_few_neighbours
-from derain.scan import Scan
+from derain.scan import Floats, Ints, Scan
 from derain.views.morton import MOST_COPIES
 
 
@@ -39,22 +39,20 @@ counts = st.integers(2, 12)
 UNCLEAR = 1e-6
 
 
-def pairs(xyz: NDArray[np.float32]) -> NDArray[np.float64]:
+def pairs(xyz: NDArray[np.float32]) -> Floats:
     """Distances of all pairs, float64 (M, M)."""
     exact = xyz.astype(np.float64)
     return np.sqrt(np.square(exact[:, None] - exact[None]).sum(axis=2))
 
 
-def positions(scan: Scan) -> tuple[NDArray[np.float32], NDArray[np.int64], NDArray[np.int64]]:
+def positions(scan: Scan) -> tuple[NDArray[np.float32], Ints, Ints]:
     """Distinct valid positions, the first row at each, and the position of each valid row."""
     valid = np.flatnonzero(scan.valid)
     xyz, first, inverse = np.unique(scan.xyz[valid], axis=0, return_index=True, return_inverse=True)
     return xyz, valid[first], inverse.reshape(-1)
 
 
-def check(
-    scan: Scan, filter_: PointFilter, value: NDArray[np.float64], limit: NDArray[np.float64]
-) -> None:
+def check(scan: Scan, filter_: PointFilter, value: Floats, limit: Floats) -> None:
     """Compares verdicts on all rows whose position's value is clearly off its limit.
 
     Rain is what lies above the limit.
@@ -68,7 +66,7 @@ def check(
     assert not (wrong & ~unclear).any()
 
 
-def mean_of_nearest(xyz: NDArray[np.float32], neighbours: int) -> NDArray[np.float64]:
+def mean_of_nearest(xyz: NDArray[np.float32], neighbours: int) -> Floats:
     return np.sort(pairs(xyz), axis=1)[:, 1:neighbours].mean(axis=1)
 
 

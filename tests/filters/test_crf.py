@@ -16,7 +16,7 @@ from derain.filters.airborne import fit_rain_bounds
 from derain.filters.crf import _along_the_sweep
 from derain.filters.ground import find_ground
 from derain.filters.random_field import decide_sequentially
-from derain.scan import Scan
+from derain.scan import Bools, Floats, Ints, Scan
 
 # Nearer than this to a limit, rounding may decide.
 UNCLEAR = 1e-9
@@ -48,7 +48,7 @@ class Reference:
         values = np.linalg.eigvalsh(np.cov(self.xyz[self.near[row]].T, bias=True))
         return max(values[0], 0) / values.sum() if values.sum() > 0 else 0
 
-    def published(self) -> NDArray[np.bool_]:
+    def published(self) -> Bools:
         candidate = (self.intensity <= 2) & (self.range <= 30) & (self.xyz[:, 2] >= -1.8)
         feature = {
             row: (1 + self.scatter(row))
@@ -62,7 +62,7 @@ class Reference:
         least = min(feature.values())
         return self.decided({row: 2 * (f - least) / spread - 1 for row, f in feature.items()})
 
-    def fitted(self, candidate: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def fitted(self, candidate: Bools) -> Bools:
         feature = {
             row: (1 + self.scatter(row))
             * (5 + min(self.apart[row].mean() / (0.1 + self.range[row]), 1))
@@ -70,7 +70,7 @@ class Reference:
         }
         return self.decided({row: 2 * (f - 5 / 3) / (8 - 5 / 3) - 1 for row, f in feature.items()})
 
-    def decided(self, feature: dict[int, float]) -> NDArray[np.bool_]:
+    def decided(self, feature: dict[int, float]) -> Bools:
         """Judges the candidates in the order of azimuth."""
         azimuth = np.arctan2(self.xyz[:, 1] + 0.0, self.xyz[:, 0])
         self.is_clear &= len(np.unique(azimuth)) == len(azimuth)
@@ -86,13 +86,13 @@ class Reference:
 
 
 def by_loop(
-    feature: NDArray[np.float64],
-    rows: NDArray[np.int64],
-    place: NDArray[np.int64],
-    neighbours: NDArray[np.int64],
+    feature: Floats,
+    rows: Ints,
+    place: Ints,
+    neighbours: Ints,
     distances: NDArray[np.floating],
     vote: float,
-) -> tuple[NDArray[np.bool_], list[float]]:
+) -> tuple[Bools, list[float]]:
     """Decides one point after the other; returns the rain, and the totals that decided."""
     votes = [vote if f > 0.6 else -vote if f < -0.4 else f for f in feature.tolist()]
     rain, totals = feature > 0.6, []
@@ -152,7 +152,7 @@ def test_the_fitted_variant_does_the_same_within_its_own_bounds(seed) -> None:
     ground = find_ground(scan.xyz)
     reference = Reference(scene(1200, seed), 8)
 
-    def around(rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    def around(rows: Ints) -> tuple[Ints, NDArray[np.float32]]:
         return reference.near[rows], reference.apart[rows].astype(np.float32)
 
     above = ground.is_above(scan.xyz)
@@ -168,11 +168,11 @@ def test_the_fitted_variant_does_the_same_within_its_own_bounds(seed) -> None:
     np.testing.assert_array_equal(FilterDerainer(CRF(), 1)(scan), expected)
 
 
-def iou(found: NDArray[np.bool_], rain: NDArray[np.bool_]) -> float:
+def iou(found: Bools, rain: Bools) -> float:
     return float((found & rain).sum() / (found | rain).sum())
 
 
-def drops(points: int) -> NDArray[np.bool_]:
+def drops(points: int) -> Bools:
     """Which points of :func:`scene` are drops."""
     return np.arange(points) >= points - points // 10
 

@@ -2,14 +2,12 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from derain.filters.ground import find_ground
+from derain.scan import Floats
 
 
-def road(
-    slope_x: float, slope_y: float, offset: float, generator: np.random.Generator
-) -> NDArray[np.float64]:
+def road(slope_x: float, slope_y: float, offset: float, generator: np.random.Generator) -> Floats:
     """Rings of returns from a plane, as a spinning sensor sees it, float64 (6000, 3)."""
     reach, azimuth = np.meshgrid(np.geomspace(2, 29, 30), np.linspace(0, 2 * np.pi, 200))
     x, y = (reach * np.cos(azimuth)).ravel(), (reach * np.sin(azimuth)).ravel()
@@ -17,7 +15,7 @@ def road(
     return np.stack([x, y, z], axis=1)
 
 
-def clutter(generator: np.random.Generator) -> NDArray[np.float64]:
+def clutter(generator: np.random.Generator) -> Floats:
     """A wall, drops all around, and echoes from beneath the road, float64 (3200, 3)."""
     wall = np.stack(
         [np.full(2000, 15.0), generator.uniform(-20, 20, 2000), generator.uniform(-2, 6, 2000)],

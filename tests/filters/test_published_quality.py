@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from derain.filters import DROR, DSOR, ROR, SOR, SSR, FilterDerainer
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 
 PUBLISHED = [
     (DROR(azimuth_resolution=0.04), 0.251),
@@ -24,7 +23,7 @@ PUBLISHED = [
 
 
 @pytest.fixture(scope="module")
-def snowfall(shared) -> tuple[Scan, NDArray[np.bool_]]:
+def snowfall(shared) -> tuple[Scan, Bools]:
     """The scan, and which of its points are falling snow."""
     points = np.fromfile(shared / "data/wads/sample.bin", np.float32).reshape(-1, 4)
     label = np.fromfile(shared / "data/wads/sample.label", np.uint32) & 0xFFFF

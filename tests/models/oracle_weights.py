@@ -4,8 +4,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
+
+from derain.scan import Floats
 
 
 def recipe_weights(shapes: Mapping[str, Sequence[int]], seed: int) -> dict[str, Tensor]:
@@ -29,7 +30,7 @@ def recipe_weights(shapes: Mapping[str, Sequence[int]], seed: int) -> dict[str, 
     }
 
 
-def _drawn(rng: np.random.Generator, key: str, shape: Sequence[int]) -> NDArray[np.float64]:
+def _drawn(rng: np.random.Generator, key: str, shape: Sequence[int]) -> Floats:
     if key.endswith("running_var"):
         return rng.uniform(0.5, 1.5, shape)
     if key.endswith("running_mean"):

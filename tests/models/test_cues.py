@@ -8,7 +8,6 @@ import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
@@ -19,7 +18,7 @@ from derain.learning.batch import Batch, Sample
 from derain.models.cues import CueFusion
 from derain.models.cues.geometry import in_steps
 from derain.models.cues.network import LARGEST_LOG_ODDS, Calibration
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.views.intensity_rank import INTENSITY_RANKS
 from derain.views.isolated_points import SHELLS
 from derain.views.probability import probability_of_rain
@@ -53,12 +52,12 @@ def test_brightness_helps_whatever_its_unit(trained) -> None:
     scan = labelled(20)
     rain = scan.label == 110
 
-    def called(scan: Scan) -> NDArray[np.bool_]:
+    def called(scan: Scan) -> Bools:
         seen = trained.spec.make_view()(scan)
         logits = trained.logits_of(Batch.of([Sample.of(scan, seen, trained.card)])).detach()
         return seen.back(probability_of_rain(logits.numpy())) > 0.5
 
-    def iou(answer: NDArray[np.bool_]) -> float:
+    def iou(answer: Bools) -> float:
         return float((answer & rain).sum() / (answer | rain).sum())
 
     usual = called(scan)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from derain.cards.card import load_card
@@ -12,7 +11,7 @@ from derain.evaluation.hard_cases import scene
 from derain.learning.batch import Batch, Sample
 from derain.models.outdet import PUBLISHED_KEYS, OutDet, OutDetNetwork
 from derain.models.published import read_state_dict
-from derain.scan import Scan
+from derain.scan import Floats, Ints, Scan
 from derain.views.candidates import Bound, Candidates
 from derain.views.neighbours import NeighbourView
 
@@ -24,24 +23,24 @@ def published(network: OutDetNetwork) -> dict[str, Tensor]:
 
 def as_published(
     state_dict: dict[str, Tensor],
-    points: NDArray[np.float64],
-    distances: NDArray[np.float64],
-    neighbours: NDArray[np.int64],
+    points: Floats,
+    distances: Floats,
+    neighbours: Ints,
     training: bool = False,
-) -> NDArray[np.float64]:
+) -> Floats:
     """The published formula, term by term, without dropout.
 
     Source: sporsho/3D_OutDet, _out_det.py.
     """
     p = {key: tensor.double().numpy() for key, tensor in state_dict.items()}
 
-    def batch_norm(x: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+    def batch_norm(x: Floats, name: str) -> Floats:
         mean, var = p[f"{name}.running_mean"], p[f"{name}.running_var"]
         if training:
             mean, var = x.mean(axis=0), x.var(axis=0)
         return (x - mean) / np.sqrt(var + 1e-5) * p[f"{name}.weight"] + p[f"{name}.bias"]
 
-    def leaky(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    def leaky(x: Floats) -> Floats:
         return np.where(x > 0, x, 0.2 * x)
 
     d = (p["convs.0.conv1.dw"] * (distances + 1.0))[..., None]

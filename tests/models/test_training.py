@@ -19,6 +19,7 @@ from derain.models.lisnownet import LiSnowNet
 from derain.models.measured import MONITOR
 from derain.models.outdet import OutDet
 from derain.models.salsanext import SalsaNext
+from derain.scan import Bools
 from derain.sources.training_record import record_of_scans
 
 from .conftest import assert_same
@@ -27,7 +28,7 @@ from .two_processes import GRID
 RAIN = 3
 
 
-def iou(predicted: NDArray[np.bool_], rain: NDArray[np.bool_]) -> float:
+def iou(predicted: Bools, rain: Bools) -> float:
     return np.count_nonzero(predicted & rain) / np.count_nonzero(predicted | rain)
 
 

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
-from numpy.typing import NDArray
 
 from derain.pictures.speed_error import (
     LEAST_ERROR,
@@ -18,6 +17,7 @@ from derain.pictures.speed_error import (
     readable_size,
     speed_error_figure,
 )
+from derain.scan import Floats
 
 values = st.sampled_from([0.0, 0.1, 0.2, 0.5, 1.0])
 standings = st.lists(
@@ -53,7 +53,7 @@ def crowd(seed: int) -> list[Standing]:
     ]
 
 
-def drawn(methods: list[Standing]) -> tuple[Figure, NDArray[np.float64], list[Bbox]]:
+def drawn(methods: list[Standing]) -> tuple[Figure, Floats, list[Bbox]]:
     """The picture, the places of its markers, pixels, and the extents of its labels' letters."""
     figure = speed_error_figure(methods, "methods")
     figure.draw_without_rendering()

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from derain.recordings.evidence import (
     LARGEST_LOG_ODDS,
@@ -14,12 +13,12 @@ from derain.recordings.evidence import (
     vote,
 )
 from derain.recordings.rays import RayEvidence
-from derain.scan import Scan
+from derain.scan import Floats, Scan
 
 from .test_rays import STEP, wall
 
 
-def points_of(xyz: NDArray[np.float64]) -> ScanPoints:
+def points_of(xyz: Floats) -> ScanPoints:
     return ScanPoints(Scan.of(xyz), threads=1)
 
 

@@ -5,14 +5,13 @@ from collections.abc import Iterable
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export.methods import load_method
 from derain.files import write_scan
 from derain.recordings.persistence import Persistence, PersistenceDerainer
-from derain.scan import Scan
+from derain.scan import Bools, Floats, Scan
 from derain.sources.folders import named_frames
 from derain.sources.frame import MemoryFrame
 from derain.sources.judgement import Judgement
@@ -24,7 +23,7 @@ DROPS = 60
 STEP = np.radians(0.5)
 
 
-def seen_from(x: float, seed: int) -> NDArray[np.float64]:
+def seen_from(x: float, seed: int) -> Floats:
     """A yard with a floor, walls and drops, seen by a sensor at (x, 0, 0), float64 (N, 3)."""
     generator = np.random.default_rng(seed)
     azimuth = np.arange(-np.pi, np.pi, STEP)
@@ -66,7 +65,7 @@ def judged(frames: Iterable[MemoryFrame], **parameters: int) -> list[Judgement]:
     return [judgement for _, judgement, _ in judgements(method, frames)]
 
 
-def is_drop(scan: Scan) -> NDArray[np.bool_]:
+def is_drop(scan: Scan) -> Bools:
     return np.arange(len(scan)) >= len(scan) - DROPS
 
 

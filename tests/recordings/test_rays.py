@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from derain.recordings.rays import (
     ENDS_AT,
@@ -17,6 +16,7 @@ from derain.recordings.rays import (
     Rays,
     ray_evidence,
 )
+from derain.scan import Floats
 
 from .street import motion
 
@@ -24,7 +24,7 @@ from .street import motion
 STEP = np.radians(0.25)
 
 
-def wall(distance: float, rows: int = 24, columns: int = 40) -> NDArray[np.float64]:
+def wall(distance: float, rows: int = 24, columns: int = 40) -> Floats:
     """Points of a wall across x, seen by evenly spaced rays, (rows * columns, 3)."""
     inclination, azimuth = np.meshgrid(
         (np.arange(rows) - rows / 2 + 0.5) * STEP, (np.arange(columns) - columns / 2) * STEP

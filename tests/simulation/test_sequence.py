@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from derain.files.extrinsics import read_extrinsics
 from derain.files.labels import instance, read_labels, semantic
+from derain.scan import Floats
 from derain.simulation.campaign import Campaign, Drive
 from derain.simulation.classes import TrackClass
 from derain.simulation.radar import Radar
@@ -31,7 +32,7 @@ def table(path: Path) -> dict[str, list[str]]:
     return {name: [row[name] for row in rows] for name in rows[0]}
 
 
-def times(folder: Path) -> NDArray[np.float64]:
+def times(folder: Path) -> Floats:
     return np.array(table(folder / "metadata.csv")["timestamp"], float)
 
 
@@ -117,7 +118,7 @@ def test_the_weather_is_that_of_the_campaign(folder) -> None:
 
 
 def test_the_poses_of_a_drive_take_the_road_of_every_scan_to_the_same_place(drive) -> None:
-    road: list[NDArray[np.float64]] = []
+    road: list[Floats] = []
     seen: set[int] = set()
     for kind in ("innoviz", "lidar_radar_pcd"):
         for frame in named_frames([drive / kind]):

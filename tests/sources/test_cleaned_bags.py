@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import yaml
 from contents import contents
-from numpy.typing import NDArray
 from small_bags import bag_path, change_database, small_bag, storage_file, tables
 
 import derain
@@ -29,6 +28,7 @@ from benchmarks.recorded_bags import (
 from derain.bags.cloud_message import CDR, ROS1, CloudMessage
 from derain.export.runtime import Derainer
 from derain.filters import ROR, FilterDerainer
+from derain.scan import Bools
 from derain.sources.folders import named_frames
 
 RUN = ("run", "ror", "--set", "radius=2", "--set", "neighbours=3")
@@ -44,7 +44,7 @@ def cloud_of(message: bytes, storage: Storage) -> CloudMessage:
 
 
 @pytest.fixture
-def rain() -> list[NDArray[np.bool_]]:
+def rain() -> list[Bools]:
     """The rain of each cloud, by the filter itself."""
     ror = FilterDerainer(ROR(radius=2, neighbours=3))
     return [ror(np.column_stack([table[axis] for axis in "xyz"])) for table in tables()]

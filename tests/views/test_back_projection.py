@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from derain.scan import Bools
 from derain.views.back_projection import (
     CHUNK,
     ProjectedPoints,
@@ -111,7 +112,7 @@ def test_away_from_the_borders_the_vote_is_the_published_one() -> None:
     np.testing.assert_array_equal(ours > 0.5, theirs)
 
 
-def published_vote(points: ProjectedPoints, score: NDArray[np.float32]) -> NDArray[np.bool_]:
+def published_vote(points: ProjectedPoints, score: NDArray[np.float32]) -> Bools:
     """RangeNet++'s k-NN search as published: class 0 is void, 1 is other and 2 is rain."""
     shown = torch.from_numpy(np.where(np.isinf(points.nearest), -1, points.nearest))
     classes = torch.from_numpy(np.where(score > 0.5, 2, 1)).reshape(shown.shape)

@@ -4,16 +4,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 from derain.views.candidate_fit import WORTH, fit_candidates
 
 CHANNELS = ("x", "y", "z", "intensity")
 
 
-def street(points: int, seed: int, drops: float = 0.2) -> tuple[Scan, NDArray[np.bool_]]:
+def street(points: int, seed: int, drops: float = 0.2) -> tuple[Scan, Bools]:
     """A scan whose rain is near, high and dim, but for a few drops that may be anywhere."""
     generator = np.random.default_rng(seed)
     rain = generator.random(points) < drops

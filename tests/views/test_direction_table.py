@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
+from derain.scan import Ints
 from derain.simulation.sensor import unit_vectors
 from derain.views.direction_table import BINS, BORDER_MARGIN, UNSURE_BELOW, height_of, turn_of
 from derain.views.directions import directions
@@ -23,7 +24,7 @@ GRIDS = [
 ]
 
 
-def computed(grid: SphericalGrid, xyz: NDArray[np.float32]) -> NDArray[np.int64]:
+def computed(grid: SphericalGrid, xyz: NDArray[np.float32]) -> Ints:
     """Pixels by the trigonometry of every point in float64; -1 outside."""
     azimuth, inclination = directions(xyz)
     ascending = np.array(grid.edges[::-1])

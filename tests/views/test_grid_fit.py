@@ -4,12 +4,11 @@ import json
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases
 from derain.files import DEFAULT_COLUMNS, read_scan
-from derain.scan import Scan
+from derain.scan import Floats, Scan
 from derain.simulation.sensor import unit_vectors
 from derain.views.grid_fit import PIXELS_PER_RETURN, fit_grid
 from derain.views.spherical_grid import WADS_BEAMS, grid_of
@@ -19,11 +18,7 @@ BEAMS = np.array([9.0, 5.0, 3.2, 2.0, 1.1, 0.4, -0.3, -1.0, -2.1, -4.0, -7.5, -1
 
 
 def sensed(
-    azimuth: NDArray[np.float64],
-    inclination: NDArray[np.float64],
-    keep: float = 0.8,
-    bend: float = 0.0,
-    seed: int = 0,
+    azimuth: Floats, inclination: Floats, keep: float = 0.8, bend: float = 0.0, seed: int = 0
 ) -> Scan:
     """Returns of beams by shots at random ranges, some shots without, in no order.
 
@@ -135,7 +130,7 @@ def test_outliers_behind_a_sensor_that_looks_ahead_stay_outside() -> None:
     assert odd.outside == pytest.approx(3 / odd.points)
 
 
-def organised(inclination: NDArray[np.float64], blur: float) -> Scan:
+def organised(inclination: Floats, blur: float) -> Scan:
     rng = np.random.default_rng(3)
     azimuth = np.arange(180, -180, -0.5)
     grid = np.stack(np.meshgrid(azimuth, inclination), axis=-1)

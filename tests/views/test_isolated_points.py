@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from derain.evaluation.hard_cases import hard_cases, scene
-from derain.scan import Scan
+from derain.scan import Ints, Scan
 from derain.simulation.sensor import unit_vectors
 from derain.views.intensity_rank import INTENSITY_RANKS, intensity_rank
 from derain.views.isolated_points import (
@@ -44,7 +43,7 @@ def wall_and_drops(seed: int = 0, drops: int = 200) -> Scan:
     return Scan.of(points).with_label(np.repeat([0, 1], [len(y), drops]))
 
 
-def rows_of(seen: IsolatedPoints) -> NDArray[np.int64]:
+def rows_of(seen: IsolatedPoints) -> Ints:
     """Rows of the scan that are isolated."""
     return seen.first[seen.neighbours[:, 0]]
 

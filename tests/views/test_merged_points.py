@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from derain.scan import Floats, Ints
 from derain.simulation.sensor import unit_vectors
 from derain.views.merged_points import RANGE_RESOLUTION, SAME_RAY, are_one_return, merged_points
 from derain.views.neighbour_search import NeighbourSearch
@@ -14,7 +14,7 @@ from derain.views.neighbour_search import NeighbourSearch
 RAYS = unit_vectors(np.arange(0, 360, 6), np.linspace(-20, 5, 8)[:, None])
 
 
-def merged(xyz: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def merged(xyz: Floats) -> tuple[Ints, Ints]:
     points = xyz.astype(np.float32)
     neighbours, distances = NeighbourSearch(points)(9)
     return merged_points(points, np.arange(len(points)), neighbours, distances)

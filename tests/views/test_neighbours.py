@@ -8,7 +8,7 @@ from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
 from derain.evaluation.hard_cases import scene
-from derain.scan import Scan
+from derain.scan import Ints, Scan
 from derain.views.candidates import Bound, Candidates
 from derain.views.channels import filled_values
 from derain.views.morton import distinct_positions, distinct_rows, first_rows, morton_code
@@ -28,7 +28,7 @@ scattered = hnp.arrays(
 )
 
 
-def brute_force(xyz: NDArray[np.float32], k: int) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+def brute_force(xyz: NDArray[np.float32], k: int) -> tuple[Ints, NDArray[np.float32]]:
     squared = ((xyz[:, None].astype(np.float64) - xyz[None].astype(np.float64)) ** 2).sum(axis=2)
     rank = np.broadcast_to(np.arange(len(xyz)), squared.shape)
     order = np.lexsort((rank, squared))[:, : min(k, len(xyz))]

@@ -4,13 +4,12 @@ from functools import cache
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from derain.cards.card import load_card
 from derain.files import read_scan
 from derain.filters import DROR, FilterDerainer
 from derain.models.outdet import OutDet
-from derain.scan import LARGEST_COORDINATE, Scan
+from derain.scan import LARGEST_COORDINATE, Floats, Scan
 from derain.simulation.sensor import unit_vectors
 from derain.views.one_viewpoint import (
     FEWEST_RETURNS,
@@ -23,7 +22,7 @@ from derain.views.one_viewpoint import (
 # Where the sensor is above the road, metres.
 HEIGHT = 1.8
 
-Points = NDArray[np.float64]
+Points = Floats
 
 
 def rays(beams: int, steps: int, sector: float = 360.0, opening: float = 30.0) -> Points:

@@ -7,13 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
-from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases
 from derain.files import read_scan
 from derain.files.labels import label_beside, read_labels, semantic
-from derain.scan import Scan
+from derain.scan import Bools, Ints, Scan
 from derain.views.back_projection import BACK_PROJECTIONS, REACH, ProjectedPoints
 from derain.views.candidates import Bound, Candidates
 from derain.views.grid_fit import fit_grid
@@ -33,7 +32,7 @@ clouds = hnp.arrays(
 )
 
 
-def shown_by_hand(scan: Scan, pixel: NDArray[np.int64], size: int) -> list[int]:
+def shown_by_hand(scan: Scan, pixel: Ints, size: int) -> list[int]:
     """Row of the nearest return of each pixel, the first of equally near ones."""
     winner = [-1] * size
     for row in np.lexsort((np.arange(len(scan)), scan.range)):
@@ -200,12 +199,12 @@ def test_scores_come_back_by_the_named_back_projection(grid, back_projection, po
     assert image.wraps == (grid is FULL)
 
 
-def labelled(path: Path, snow: int = 110) -> tuple[Scan, NDArray[np.bool_]]:
+def labelled(path: Path, snow: int = 110) -> tuple[Scan, Bools]:
     scan = read_scan(path)
     return scan, semantic(read_labels(label_beside(path), len(scan))) == snow
 
 
-def iou_of_perfect_pixels(view: RangeView, scan: Scan, rain: NDArray[np.bool_]) -> float:
+def iou_of_perfect_pixels(view: RangeView, scan: Scan, rain: Bools) -> float:
     image = view(scan)
     called = image.back((image.target(rain) == 1).astype(np.float32)) > 0.5
     return float((called & rain).sum() / (called | rain).sum())

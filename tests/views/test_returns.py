@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from derain.evaluation.hard_cases import hard_cases
 from derain.files import read_scan
-from derain.scan import Scan
+from derain.scan import Floats, Scan
 from derain.simulation.sensor import unit_vectors
 from derain.views.directions import FEWEST_PAIRS, TOLERANCES, shared_direction_pairs
 from derain.views.return_columns import LEAST_APART
@@ -35,7 +34,7 @@ def test_the_rays_of_a_sensor_of_two_returns_are_found(seed, share, step) -> Non
     assert returns.found_by == "directions"
 
 
-def apart(unit: NDArray[np.float64]) -> NDArray[np.float64]:
+def apart(unit: Floats) -> Floats:
     """Angle between any two directions, float64 (M, M), degrees; that to oneself is infinite."""
     chord = np.linalg.norm(unit[:, None] - unit, axis=-1)
     np.fill_diagonal(chord, np.inf)

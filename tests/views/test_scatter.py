@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
-from numpy.typing import NDArray
 
+from derain.scan import Floats
 from derain.views.scatter import scatter_through_space
 
 clouds = hnp.arrays(
@@ -14,12 +14,12 @@ clouds = hnp.arrays(
 )
 
 
-def by_numpy(xyz: NDArray[np.float64]) -> float:
+def by_numpy(xyz: Floats) -> float:
     values = np.linalg.eigvalsh(np.cov(xyz.T, bias=True).reshape(3, 3))
     return max(values[0], 0) / values.sum() if values.sum() > 0 else 0
 
 
-def of_one(xyz: NDArray[np.float64]) -> float:
+def of_one(xyz: Floats) -> float:
     return float(scatter_through_space(xyz, np.arange(len(xyz))[None])[0])
 
 

@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from derain.evaluation.ray_counts import RayCounts
 from derain.files import read_scan
 from derain.files.labels import read_labels
-from derain.scan import Scan
+from derain.scan import Bools, Ints, Scan
 from derain.views.returns import pair_returns
 from derain.weather.rays import BIN, RANGE_BINS, RAY_SECTORS, ray_ends
 
@@ -26,7 +25,7 @@ def azimuth_of(ray: int) -> float:
     return 9.0 * ray + 0.005 - 180
 
 
-def scan_of(returns: list[Return]) -> tuple[Scan, NDArray[np.bool_]]:
+def scan_of(returns: list[Return]) -> tuple[Scan, Bools]:
     """The scan of some returns, and what is rain of it."""
     azimuth = np.radians([azimuth_of(ray) for ray, _, _ in returns])
     inclination = np.radians([ray % 7 + 0.005 for ray, _, _ in returns])
@@ -39,7 +38,7 @@ def scan_of(returns: list[Return]) -> tuple[Scan, NDArray[np.bool_]]:
     return Scan(points), np.array([rain for _, _, rain in returns], bool)
 
 
-def counted_one_by_one(returns: list[Return]) -> NDArray[np.int64]:
+def counted_one_by_one(returns: list[Return]) -> Ints:
     """The same by going from ray to ray."""
     counts = np.zeros((2, RAY_SECTORS, RANGE_BINS), np.int64)
     for ray in {ray for ray, _, _ in returns}:

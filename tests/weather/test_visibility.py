@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from numpy.typing import NDArray
 
+from derain.scan import Ints
 from derain.weather.rays import BIN
 from derain.weather.visibility import (
     CLEAR_AIR,
@@ -23,9 +23,7 @@ BINS = 40
 counts = arrays(np.int64, BINS, elements=st.integers(0, 400))
 
 
-def drawn(
-    rate: float, rays: int, walls: tuple[float, float]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def drawn(rate: float, rays: int, walls: tuple[float, float]) -> tuple[Ints, Ints]:
     """Rays that meet drops at a rate per metre, in front of walls at some ranges."""
     generator = np.random.default_rng(0)
     drop, wall = generator.exponential(1 / rate, rays), generator.uniform(*walls, rays)

@@ -10,7 +10,6 @@ import pytest
 from lightning.pytorch.loggers import TensorBoardLogger
 from lightning.pytorch.trainer.states import TrainerFn
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from tensorboard.util import tensor_util
 
@@ -24,7 +23,7 @@ from derain.models.callbacks import panels
 from derain.models.callbacks.panels import CHARTS, Dashboard, DrawnEpochs, ErrorPanels, ScanPanels
 from derain.models.outdet import OutDet
 from derain.pictures.error_pictures import errors_figure
-from derain.scan import Scan
+from derain.scan import Bools, Scan
 
 SNOW = 110
 RAINY = (1, 2, 4, 5)  # of six scans
@@ -90,7 +89,7 @@ def rainy(tmp_path) -> Folder:
     return Folder(str(tmp_path), "wads", **parts, loading=Loading(batch_size=4))
 
 
-Drawn = tuple[Scan, NDArray[np.bool_], NDArray[np.bool_], str]
+Drawn = tuple[Scan, Bools, Bools, str]
 
 
 @pytest.fixture
@@ -110,7 +109,7 @@ def drawn(monkeypatch) -> list[Drawn]:
 def test_the_first_rainy_scans_are_drawn_after_every_epoch(
     make_trainer, rainy, drawn, tmp_path, scans, expected
 ) -> None:
-    judged: list[list[NDArray[np.bool_]]] = []
+    judged: list[list[Bools]] = []
 
     class Judged(lightning.Callback):
         def on_validation_batch_end(self, *arguments: Any) -> None:

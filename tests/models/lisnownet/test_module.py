@@ -25,7 +25,7 @@ from derain.models.lisnownet.network import LiSnowNetwork
 from derain.models.lisnownet.selection_rule import FEWEST, SelectionRule, cube_roots, rain_logits
 from derain.models.lisnownet.sparsity import sparsity_loss
 from derain.models.measured import MONITOR
-from derain.scan import Scan
+from derain.scan import Bools, Floats, Scan
 from derain.sources import file_frame
 from derain.views.probability import probability_of_rain
 from derain.views.range_image import RangeImage
@@ -69,9 +69,7 @@ def test_the_network_sees_cube_roots(distance, intensity, full_scale, seen) -> N
     np.testing.assert_allclose(roots.flatten(), seen, rtol=1e-6)
 
 
-def snow_as_published(
-    image: NDArray[np.float64], change: NDArray[np.float64], rule: SelectionRule
-) -> NDArray[np.bool_]:
+def snow_as_published(image: Floats, change: Floats, rule: SelectionRule) -> Bools:
     """The published rule, word for word (Source: M.-Y. Yu et al., IROS 2022)."""
     distance, height, intensity = image
     of_range, of_intensity = change

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import torch
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from derain.errors import InputError
@@ -18,6 +17,7 @@ from derain.models.lisnownet.network import (
     published_key,
 )
 from derain.models.lisnownet.sparsity import sparsity_loss
+from derain.scan import Bools, Floats
 
 from ..oracle_weights import recipe_weights
 
@@ -171,7 +171,7 @@ def test_each_block_is_multiplied_by_the_basis_which_is_its_own_inverse() -> Non
     torch.testing.assert_close(inverse_haar(haar(image)), image)
 
 
-def neighbourhoods(image: NDArray[np.float64], size: int) -> NDArray[np.float64]:
+def neighbourhoods(image: Floats, size: int) -> Floats:
     """(2, H, W, size, size), edges continued by NumPy."""
     margin = size // 2
     image = np.pad(image, ((0, 0), (0, 0), (margin, margin)), mode="wrap")
@@ -179,11 +179,11 @@ def neighbourhoods(image: NDArray[np.float64], size: int) -> NDArray[np.float64]
     return sliding_window_view(image, (size, size), axis=(1, 2))
 
 
-def as_published(image: NDArray[np.float64]) -> NDArray[np.float64]:
+def as_published(image: Floats) -> Floats:
     """The published formula, where empty pixels are -1; NaN where it is 0 / 0."""
-    valid: NDArray[np.bool_] = np.any(image >= 0, axis=0)
+    valid: Bools = np.any(image >= 0, axis=0)
     dense = np.where(valid, image, neighbourhoods(image, 3).max(axis=(3, 4)))
-    known: NDArray[np.bool_] = np.any(dense >= 0, axis=0)
+    known: Bools = np.any(dense >= 0, axis=0)
     for channel, row in np.ndindex(dense.shape[:2]):
         values = dense[channel, row, known[row]]
         level = values.mean() + values.std() if len(values) else np.nan
