@@ -7,17 +7,7 @@ import pytest
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
-from derain.filters import (
-    CRF,
-    DROR,
-    DSOR,
-    FILTERS,
-    ROR,
-    SOR,
-    SSR,
-    FilterDerainer,
-    filter_from,
-)
+from derain.filters import CRF, DROR, DSOR, FILTERS, ROR, SOR, SSR, FilterDerainer, filter_from
 from derain.scan import Scan
 from derain.sources.frame import MemoryFrame
 from derain.system.stopwatch import Stopwatch

@@ -32,12 +32,7 @@ def street(generator: np.random.Generator, points: int = 40_000) -> NDArray:
     return np.concatenate([road, walls, across])
 
 
-def scan_from(
-    pose: NDArray,
-    seed: int,
-    drops: int = 500,
-    world: NDArray | None = None,
-) -> Scan:
+def scan_from(pose: NDArray, seed: int, drops: int = 500, world: NDArray | None = None) -> Scan:
     """What a sensor sees of the street: each scan meets it at other points, and other drops.
 
     Args:

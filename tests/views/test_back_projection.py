@@ -10,13 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from derain.scan import Bools
-from derain.views.back_projection import (
-    CHUNK,
-    ProjectedPoints,
-    copy,
-    nearest_range,
-    vote,
-)
+from derain.views.back_projection import CHUNK, ProjectedPoints, copy, nearest_range, vote
 
 SHAPES = st.tuples(st.integers(1, 7), st.integers(1, 9))
 

@@ -134,8 +134,7 @@ def test_scans_of_a_batch_stay_apart() -> None:
     packed = IsolatedPoints.pack(seen)
     begin = len(seen[0].points)
     np.testing.assert_array_equal(
-        packed["points"][packed["neighbours"][seen[0].size :]],
-        seen[1].points[seen[1].neighbours],
+        packed["points"][packed["neighbours"][seen[0].size :]], seen[1].points[seen[1].neighbours]
     )
     assert packed["neighbours"][: seen[0].size].max() < begin
     assert packed["counts"].shape == (2, SHELLS, INTENSITY_RANKS)

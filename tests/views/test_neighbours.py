@@ -17,9 +17,7 @@ from derain.views.neighbours import Neighbourhoods, NeighbourView
 
 # Few values on a coarse grid: many duplicates and many equal distances.
 gridded = hnp.arrays(
-    np.float32,
-    st.tuples(st.integers(0, 60), st.just(3)),
-    elements=st.integers(-3, 3).map(float),
+    np.float32, st.tuples(st.integers(0, 60), st.just(3)), elements=st.integers(-3, 3).map(float)
 )
 scattered = hnp.arrays(
     np.float32,
