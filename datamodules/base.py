@@ -45,18 +45,6 @@ class ScanDataModule(ScanData, lightning.LightningDataModule):
         lightning.LightningDataModule.__init__(self)
         ScanData.__init__(self, card, loading)
 
-    def prepare_data(self) -> None:
-        """Finds the scans of a training before Lightning makes the folder of its log.
-
-        Raises:
-            InputError: Missing folders or scans.
-        """
-        trainer = self.trainer
-        if trainer is not None and trainer.training:
-            self.source("train")
-            if trainer.limit_val_batches:
-                self.source("validation")
-
     def epoch_source(self, part: Part) -> Source:
         """The scans that a loader of a part passes through: by default, each of them once.
 

@@ -97,14 +97,9 @@ class Mixture(ScanDataModule):
         return [weight / sum(self.weights.values()) for weight in self.weights.values()]
 
     def prepare_data(self) -> None:
-        """Prepares each part, such as by simulating its scans, and finds the scans of all.
-
-        Raises:
-            InputError: Missing folders or scans, or a part that cannot be prepared.
-        """
+        """Prepares each part, such as by simulating its scans."""
         for part in self.parts.values():
             part.prepare_data()
-        super().prepare_data()
 
     def source(self, part: Part) -> Source:
         """The scans of all parts, one part after the other.

@@ -52,15 +52,14 @@ class SimulatedDataModule(SequenceDataModule):
         self.workers = workers or usable_cores()
 
     def prepare_data(self) -> None:
-        """Simulates the data set where it is missing, and finds its scans.
+        """Simulates the data set where it is missing.
 
         Raises:
-            InputError: A folder that holds something else or cannot be written, or missing scans.
+            InputError: A folder that holds something else or cannot be written.
         """
         if self.make:
             with processes(self.workers) as executor:
                 simulate_track(self.root, self.campaign, executor, keep=False)
-        super().prepare_data()
 
 
 class Simulated(SimulatedDataModule):

@@ -43,10 +43,16 @@ MOST_TRAFFIC = 20
 LONGEST = 2000.0
 
 
-# Attributes of a sensor that there were not from the beginning.
+# Attributes that the sensors of earlier manifests do not have.
 LATER_ATTRIBUTES = (
-    *("row_azimuths", "pattern", "prism_turns", "tilt", "defects"),
-    *("range_noise_growth", "weak_range_noise", "encoder_noise"),
+    "row_azimuths",
+    "pattern",
+    "prism_turns",
+    "tilt",
+    "defects",
+    "range_noise_growth",
+    "weak_range_noise",
+    "encoder_noise",
 )
 
 

@@ -228,7 +228,7 @@ def _fetch(file: Path, stored: StoredObject) -> None:
 
 
 def _refusal(url: str, error: Exception) -> InputError | None:
-    """What a user is told of an error that the next try would meet again; None of any other."""
+    """The error of a request that would fail again; None for one that may succeed next time."""
     if isinstance(error, InputError):
         return error
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):

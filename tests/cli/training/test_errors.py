@@ -51,20 +51,6 @@ def test_a_configuration_is_refused_in_a_line(last_line, content, message) -> No
     assert not Path("runs").exists()
 
 
-@pytest.mark.parametrize(
-    ("train", "validation"), [("none*.bin", "scan.bin"), ("scan.bin", "none*.bin")]
-)
-def test_scans_that_are_missing_leave_no_folder_of_a_run(last_line, train, validation) -> None:
-    Path("scan.bin").write_bytes(bytes(32))
-    data = ("--data", "Folder", "--data.root", ".", "--data.card", "wads")
-    parts = ("--data.train", f"[{train}]", "--data.validation", f"[{validation}]")
-    logger = ("--trainer.logger", "TensorBoardLogger", "--trainer.logger.save_dir", "runs")
-    assert "none*.bin: matches no scan" in last_line(
-        "fit", "--model", "OutDet", *data, *parts, *logger
-    )
-    assert not Path("runs").exists()
-
-
 def test_the_remedy_for_columns_is_an_option_of_training(last_line) -> None:
     Path("scan.bin").write_bytes(bytes(36))
     Path("scan.label").write_bytes(bytes(8))
