@@ -11,7 +11,8 @@
 Prints what stands in derain/recordings/evidence.py: logistic regressions on what other scans'
 rays show, and on how points lie in their own scan, each alone. Every scan counts as much as the
 others, whatever its number of points. And what stands in export/recorded.py: what rays add to the
-log-odds of the model that comes with derain, at the points of which it is in doubt.
+log-odds of the model that comes with derain, at the points of which it is in doubt, by each of
+HALVES: the one of the least loss stands there.
 """
 
 import argparse
@@ -27,7 +28,7 @@ from sklearn.linear_model import LogisticRegression
 from derain.cards.card import load_card
 from derain.datamodules.base import Loading
 from derain.datamodules.labelled import named_scans
-from derain.export.recorded import DOUBTFUL
+from derain.export.recorded import DOUBTFUL, solidity
 from derain.export.runtime import Derainer
 from derain.recordings.evidence import ScanPoints, surroundings_features
 from derain.recordings.rays import RayEvidence, mean_evidence
@@ -37,6 +38,9 @@ from derain.sources.recordings import recordings_of
 from derain.system.cores import usable_cores
 from derain.views.morton import distinct_rows
 
+# Log-odds of rain, of the end of a ray, that may count half as something solid.
+HALVES = (0.0, 0.5, 1.0, 1.5, 2.0)
+
 
 @dataclass(frozen=True)
 class Described:
@@ -44,14 +48,15 @@ class Described:
 
     Attributes:
         rays: Where rays of other scans end, and where they went through.
-        rays_to_solid: The same, where rays that end at what the model calls rain end at nothing.
+        rays_to_solid: The same by each of HALVES: the likelier the model takes the end of a ray for
+            rain, the less it counts as solid.
         surroundings: How the points lie, float64 (M, 10).
         alone: Probability of rain by the model that comes with derain, float32 (M,).
         rain: The truth, bool (M,).
     """
 
     rays: RayEvidence
-    rays_to_solid: RayEvidence
+    rays_to_solid: list[RayEvidence]
     surroundings: Floats
     alone: NDArray[np.float32]
     rain: Bools
@@ -73,7 +78,9 @@ def main() -> None:
     print("RAY_WEIGHTS =", _fitted(rays, rain, weight))
     print("SURROUNDINGS_WEIGHTS =", _fitted(surroundings, rain, weight))
     print(f"PRIOR = {np.log(share / (1 - share)):.2f}")
-    print("OF_ENDING, OF_THROUGH =", _added(scans))
+    for half, *to_solid in zip(HALVES, *(scan.rays_to_solid for scan in scans), strict=True):
+        loss, weights = _added(scans, to_solid)
+        print(f"HALF_SOLID = {half}: OF_ENDING, OF_THROUGH = {weights}, loss {loss:.6f}")
 
 
 def _described(roots: list[Path]) -> Iterator[Described]:
@@ -85,26 +92,27 @@ def _described(roots: list[Path]) -> Iterator[Described]:
         points = [ScanPoints(scan, usable_cores()) for scan in scans]
         rows = [distinct_rows(scan)[0] for scan in scans]
         alone = [model.judge(scan) for scan in scans]
-        drops = [judged.rain[first] for judged, first in zip(alone, rows, strict=True)]
+        ends = [judged.probability[first] for judged, first in zip(alone, rows, strict=True)]
+        solid = [[solidity(one, half) for one in ends] for half in HALVES]
         for place in range(1, len(recording) - 1):
             yield Described(
                 _evidence(recording, points, place),
-                _evidence(recording, points, place, drops),
+                [_evidence(recording, points, place, of_scans) for of_scans in solid],
                 surroundings_features(points[place]),
-                alone[place].probability[rows[place]],
+                ends[place],
                 card.rain_of(scans[place])[rows[place]],
             )
 
 
 def _evidence(
-    recording: list[Frame], points: list[ScanPoints], place: int, drops: list[Bools] | None = None
+    recording: list[Frame], points: list[ScanPoints], place: int, solid: list[Floats] | None = None
 ) -> RayEvidence:
     """The evidence of the rays of the scans before and after at the points of a scan."""
     own, found = points[place], []
     for other in (place - 1, place + 1):
         to_other = np.linalg.inv(_pose(recording[other])) @ _pose(recording[place])
-        at_drops = None if drops is None else drops[other]
-        found.append(own.evidence_of(points[other], to_other, at_drops))
+        of_other = None if solid is None else solid[other]
+        found.append(own.evidence_of(points[other], to_other, of_other))
     return mean_evidence(found)
 
 
@@ -113,11 +121,12 @@ def _columns(evidence: RayEvidence) -> Floats:
     return np.stack([np.ones_like(evidence.ending), evidence.ending, evidence.through], axis=1)
 
 
-def _added(scans: list[Described]) -> tuple[float, ...]:
-    """Weights of what rays add to the model's log-odds where it is in doubt."""
+def _added(scans: list[Described], rays: list[RayEvidence]) -> tuple[float, tuple[float, ...]]:
+    """Loss and weights of what rays add to the model's log-odds where it is in doubt."""
     doubted = [scan.alone > DOUBTFUL for scan in scans]
     of_scans = list(zip(scans, doubted, strict=True))
-    columns = np.concatenate([_columns(scan.rays_to_solid)[rows, 1:] for scan, rows in of_scans])
+    of_rays = zip(rays, doubted, strict=True)
+    columns = np.concatenate([_columns(evidence)[rows, 1:] for evidence, rows in of_rays])
     alone = np.concatenate([scan.alone[rows] for scan, rows in of_scans]).astype(np.float64)
     rain = np.concatenate([scan.rain[rows] for scan, rows in of_scans])
     weight = np.concatenate([np.full(rows.sum(), 1 / max(rows.sum(), 1)) for rows in doubted])
@@ -130,7 +139,8 @@ def _added(scans: list[Described]) -> tuple[float, ...]:
         of_points = np.logaddexp(0, log_odds) - rain * log_odds
         return float(weight @ of_points), error @ columns
 
-    return tuple(float(round(each, 2)) for each in minimize(loss, np.zeros(2), jac=True).x)
+    fitted = minimize(loss, np.zeros(2), jac=True)
+    return fitted.fun / weight.sum(), tuple(float(round(each, 2)) for each in fitted.x)
 
 
 def _pose(frame: Frame) -> Floats:

@@ -25,9 +25,13 @@ from derain.views.window import Window, WindowOfScans
 DOUBTFUL = 0.01
 
 # Log-odds of rain that rays of other scans add to those of the model, fitted to simulated drives by
-# benchmarks/persistence_weights.py: for the share of them that ends at a place, and for the share
-# that went through it.
-OF_ENDING, OF_THROUGH = -10.16, 0.59
+# benchmarks/persistence_weights.py: for the share of them that ends at something solid at a place,
+# and for the share that went through it.
+OF_ENDING, OF_THROUGH = -10.32, 0.61
+
+# The end of a ray of these log-odds of rain, by the model, counts half as something solid; fitted
+# together with the weights.
+HALF_SOLID = 1.0
 
 # A judgement of another scan by itself, and what takes the frame of the scan that is judged to that
 # of the other, float64 (4, 4), metres.
@@ -47,11 +51,11 @@ CHECKED = 2000
 class RecordedDerainer(PlacedMethod):
     """Judges the scans of a recording by a model, and by the rays of the scans around each.
 
-    Rays of another scan that end where a point is show something solid there, unless the model
-    takes their own ends for rain. Those that went through the place show that nothing was. Where
-    the sensor was comes from the poses of the frames, or else from odometry. A scan of which that
-    is not known, or whose pose does not match what it shows, is judged alone. Rays of a scan that
-    the model cannot judge show nothing. Its stages are those of the model, odometry and rays.
+    Rays of another scan that end where a point is show something solid there, the less the likelier
+    their own ends are rain by the model. Those that went through the place show that nothing was.
+    Where the sensor was comes from the poses of the frames, or else from odometry. A scan of which
+    that is not known, or whose pose does not match what it shows, is judged alone. Rays of a scan
+    that the model cannot judge show nothing. Its stages are those of the model, odometry and rays.
 
     Example:
         >>> derainer = RecordedDerainer(Derainer("model.onnx"), past=1)
@@ -173,7 +177,8 @@ class RecordedDerainer(PlacedMethod):
                 continue
             places = scan.xyz[rows] @ transform[:3, :3].T + transform[:3, 3]
             rays, step = self._rays_of(other.scan), self._rays_of(scan).step
-            seen = ray_evidence(places, rays, step, other.rain[rays.rows])
+            solid_ends = solidity(other.probability[rays.rows])
+            seen = ray_evidence(places, rays, step, solid_ends)
             of_solid, of_doubtful = seen[: len(solid)], seen[len(solid) :]
             if of_solid.ending.sum() > of_solid.through.sum():
                 found.append(of_doubtful)
@@ -201,6 +206,17 @@ def _fails(scan: Scan) -> ScanIssue:
         "beside a scan that cannot be judged",
         f"the model cannot judge {name}, which is beside it: the rays of that scan are not used",
     )
+
+
+def solidity(probability: NDArray[np.float32], half: float = HALF_SOLID) -> Floats:
+    """How far ends of rays count as something solid, 0..1, float64 (R,).
+
+    Args:
+        probability: Probabilities of rain of these ends by the model, float32 (R,).
+        half: Log-odds of rain of an end that counts half.
+    """
+    rain = probability.astype(np.float64)
+    return (1 - rain) / (1 - rain + rain * np.exp(-half))
 
 
 def added_log_odds(evidence: RayEvidence) -> Floats:

@@ -13,7 +13,7 @@ from typing import Self
 import numpy as np
 
 from derain.recordings.rays import RayEvidence, Rays, ray_evidence
-from derain.scan import Bools, Floats, Scan
+from derain.scan import Floats, Scan
 from derain.views.morton import distinct_rows
 from derain.views.neighbour_search import NeighbourSearch
 from derain.views.scatter import scatter_through_space
@@ -73,17 +73,17 @@ class ScanPoints:
         return len(self.xyz)
 
     def evidence_of(
-        self, other: Self, to_other: Floats, at_drops: Bools | None = None
+        self, other: Self, to_other: Floats, solid: Floats | None = None
     ) -> RayEvidence:
         """The evidence of another scan's rays at the points of this one.
 
         Args:
             other: The other scan.
             to_other: Takes the frame of this scan to that of the other, float64 (4, 4), metres.
-            at_drops: As of :func:`ray_evidence`.
+            solid: As of :func:`ray_evidence`.
         """
         places = self.xyz @ to_other[:3, :3].T + to_other[:3, 3]
-        return ray_evidence(places, other.rays, self.rays.step, at_drops)
+        return ray_evidence(places, other.rays, self.rays.step, solid)
 
     @cached_property
     def rays(self) -> Rays:

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.scan import Bools, Floats, Ints, Scan
+from derain.scan import Floats, Ints, Scan
 from derain.system.cores import sleeping_threads
 from derain.views.morton import distinct_rows
 
@@ -124,8 +124,8 @@ class RayEvidence:
     """The evidence of the rays of another scan, or of several, at M places.
 
     Attributes:
-        ending: Share of the rays near a place that end at it, float64 (M,), weighted by how near
-            they pass.
+        ending: Share of the rays near a place that end at something solid there, float64 (M,),
+            weighted by how near they pass.
         through: Share of them that went through it to something behind, float64 (M,).
     """
 
@@ -138,7 +138,7 @@ class RayEvidence:
 
 
 def ray_evidence(
-    places: Floats, rays: Rays, step: float, at_drops: Bools | None = None
+    places: Floats, rays: Rays, step: float, solid: Floats | None = None
 ) -> RayEvidence:
     """Finds how the rays of a scan pass some places.
 
@@ -146,8 +146,8 @@ def ray_evidence(
         places: float64 (M, 3), metres, in the frame of the rays.
         rays: The rays.
         step: Angle between the beams of the scan that the places are of, radians.
-        at_drops: Which of the rays end at a drop, as far as that is known, bool (R,): they show
-            nothing solid there.
+        solid: How far each ray counts as one that ends at something solid, 0..1, float64 (R,); by
+            default, all count whole.
 
     Returns:
         The evidence; zeros where no ray is near.
@@ -159,9 +159,9 @@ def ray_evidence(
     near = angles <= max(np.radians(WITHIN), WITHIN_STEPS * step)
     behind = rays.range.take(near_rays) - reach[:, None]
     at, through = (offset + slope * reach[:, None] for offset, slope in (ENDS_AT, WENT_THROUGH))
-    ending = np.abs(behind) <= at
-    if at_drops is not None:
-        ending &= ~at_drops[near_rays]
+    ending = (np.abs(behind) <= at).astype(np.float64)
+    if solid is not None:
+        ending *= solid[near_rays]
     weight = near / (1 + np.square(angles / np.radians(HALF_WEIGHT_AT)))
     # einsum adds up short rows several times faster than a sum along the axis.
     total_weight = np.maximum(np.einsum("ij->i", weight), LEAST_WEIGHT)

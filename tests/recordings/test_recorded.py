@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from derain.errors import InputError, ScanWarning
-from derain.export.recorded import RecordedDerainer, added_log_odds
+from derain.export.recorded import HALF_SOLID, RecordedDerainer, added_log_odds, solidity
 from derain.export.runtime import Derainer
 from derain.files.extrinsics import Extrinsics
 from derain.recordings.rays import RayEvidence
@@ -128,6 +128,14 @@ def test_where_no_ray_is_near_nothing_is_added() -> None:
     nothing, through, ending = added_log_odds(evidence)
     assert nothing == 0
     assert ending < 0 < through
+
+
+def test_ends_of_rays_are_the_less_solid_the_likelier_they_are_rain() -> None:
+    log_odds = HALF_SOLID + np.array([-3, 0, 3])
+    probability = (1 / (1 + np.exp(-log_odds))).astype(np.float32)
+    of_logistic = 1 / (1 + np.exp([-3, 0, 3]))
+    np.testing.assert_allclose(solidity(probability), of_logistic, rtol=1e-5)
+    np.testing.assert_array_equal(solidity(np.array([0, 1], np.float32)), [1, 0])
 
 
 def test_scans_that_are_no_longer_seen_are_let_go(model) -> None:
