@@ -13,6 +13,7 @@
 #include <fstream>
 #include <iomanip>
 #include <iostream>
+#include <map>
 #include <string>
 #include <thread>
 #include <vector>
@@ -22,6 +23,9 @@
 namespace {
 
 namespace fs = std::filesystem;
+
+// As in derain: a million threads take all memory.
+constexpr int kMostThreads = 1024;
 
 // Written under another name first, so that nothing half-written has the right one.
 template <typename Number>
@@ -63,6 +67,18 @@ void clean(derain::Derainer& derainer, const fs::path& path, const fs::path& out
             << " ms, back " << times.back << " ms\n";
 }
 
+// Results are named by the scans alone, whatever folders these lie in.
+void refuse_equal_names(const std::vector<std::string>& scans) {
+  std::map<fs::path, std::string> named;
+  for (const std::string& scan : scans) {
+    const std::string& first = named.emplace(fs::path(scan).stem(), scan).first->second;
+    if (scan != first) {
+      throw derain::InputError(scan, "another scan has its name, and their results would too",
+                               "Clean it into another folder.");
+    }
+  }
+}
+
 // How many threads were asked for; every core where nothing or 0 was.
 unsigned threads_in(const std::string& text) {
   std::size_t end = 0;
@@ -71,7 +87,7 @@ unsigned threads_in(const std::string& text) {
     asked = std::stoi(text, &end);
   } catch (const std::exception&) {
   }
-  if (asked < 0 || end != text.size()) {
+  if (asked < 0 || asked > kMostThreads || end != text.size()) {
     throw derain::InputError("--threads", "'" + text + "' is no number of threads",
                              "Give 0 for every core.");
   }
@@ -92,10 +108,12 @@ int main(int count, char** arguments) {
       std::cerr << "usage: derain_onnx [--threads N] MODEL.onnx OUT SCAN.bin...\n";
       return 2;
     }
+    const std::vector<std::string> scans(words.begin() + 2, words.end());
+    refuse_equal_names(scans);
     derain::Derainer derainer(words[0], threads_in(threads));
     const fs::path out(words[1]);
     fs::create_directories(out);
-    for (std::size_t scan = 2; scan < words.size(); ++scan) clean(derainer, words[scan], out);
+    for (const std::string& scan : scans) clean(derainer, scan, out);
   } catch (const std::exception& error) {
     std::cerr << "derain_onnx: " << error.what() << '\n';
     return 2;

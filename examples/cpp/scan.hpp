@@ -37,7 +37,9 @@ struct Scan {
 
 inline Scan read_scan(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary | std::ios::ate);
-  if (!file) throw InputError(path.string(), "it cannot be read", "Check the path.");
+  if (!file || std::filesystem::is_directory(path)) {
+    throw InputError(path.string(), "it cannot be read", "Check the path.");
+  }
   const auto bytes = static_cast<std::size_t>(file.tellg());
   if (bytes % (kColumns * sizeof(float)) != 0) {
     throw InputError(path.string(), std::to_string(bytes) + " bytes are not whole rows of 16",

@@ -89,3 +89,31 @@ def test_a_scan_is_never_overwritten(derain_onnx, tmp_path) -> None:
     assert done.returncode == 2
     assert "it would be overwritten" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["scan.bin"]
+
+
+def test_two_scans_of_one_name_are_refused_before_one_takes_the_place_of_the_other(
+    derain_onnx, tmp_path
+) -> None:
+    scans = [tmp_path / folder / "scan.bin" for folder in "ab"]
+    for scan in scans:
+        scan.parent.mkdir()
+        scene(50).tofile(scan)
+    done = derain_onnx(default_model(), tmp_path / "out", *scans)
+    assert done.returncode == 2
+    assert f"{scans[1]}: another scan has its name" in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("threads", ["-1", "two", "1000000"])
+def test_a_number_of_threads_that_none_could_want_is_refused(
+    derain_onnx, tmp_path, threads
+) -> None:
+    done = derain_onnx("--threads", threads, default_model(), tmp_path, tmp_path / "scan.bin")
+    assert done.returncode == 2
+    assert f"--threads: '{threads}'" in done.stderr
+
+
+def test_a_folder_is_no_scan(derain_onnx, tmp_path) -> None:
+    done = derain_onnx(default_model(), tmp_path / "out", tmp_path)
+    assert done.returncode == 2
+    assert f"{tmp_path}: it cannot be read" in done.stderr
