@@ -98,8 +98,10 @@ class Job:
         try:
             read = json.loads(content)
             shards = read["shards"]
-            return cls(folder, dict(read["options"]), None if shards is None else tuple(shards))
-        except (ValueError, KeyError, TypeError) as error:
+            if shards is not None:
+                shards = int(shards[0]), int(shards[1])
+            return cls(folder, dict(read["options"]), shards)
+        except (ValueError, LookupError, TypeError) as error:
             reason = f"the options that it was begun by, {FOLDER}/{JOB}, are damaged"
             raise InputError(named, reason, "Do everything again with --anew.") from error
 
@@ -131,7 +133,7 @@ class Job:
         content = self._documents.read(UNITS)
         try:
             listed = json.loads(content or b"")
-            return [Unit(id=id_, size=size, inputs=inputs) for id_, size, inputs in listed]
+            return [Unit(id=id_, size=int(size), inputs=inputs) for id_, size, inputs in listed]
         except (TypeError, ValueError) as error:
             raise InputError(
                 without_secrets(str(self.folder)),
@@ -145,7 +147,9 @@ class Job:
         Raises:
             InputError: It cannot be written.
         """
-        self._documents.write(_name(record.unit), json.dumps(asdict(record)))
+        content = asdict(record)
+        content["checksum"] = _checksum(content)
+        self._documents.write(_name(record.unit), json.dumps(content))
 
     def records_of(self, units: Sequence[UnitT]) -> Iterator[tuple[UnitT, Record | None]]:
         """The record of each unit; None if it was not done with these inputs and options.
@@ -162,11 +166,13 @@ class Job:
 
     def _record_of(self, unit: Unit, content: bytes | None) -> Record | None:
         try:
-            record = Record(**json.loads(content or b""))
-        except (TypeError, ValueError):  # no record, a damaged one, or one of another version
+            written = json.loads(content or b"")
+            checksum = written.pop("checksum", None)  # derain 0.2 wrote none
+            record = Record(**written)
+        except (AttributeError, TypeError, ValueError):  # none, damaged, or of another version
             return None
         unchanged = (unit.inputs, self.fingerprint) == (record.inputs, record.options)
-        return record if unchanged else None
+        return record if unchanged and checksum in (None, _checksum(written)) else None
 
     @property
     def _documents(self) -> Documents:
@@ -244,6 +250,11 @@ def differences(begun: Mapping[str, Any], now: Mapping[str, Any]) -> str:
         for name in names
         if begun.get(name) != now.get(name)
     )
+
+
+def _checksum(content: Any) -> str:
+    """16 hexadecimal digits of the SHA-256 of what JSON holds."""
+    return sha256(json.dumps(content).encode()).hexdigest()[:16]
 
 
 def _name(unit: str) -> str:

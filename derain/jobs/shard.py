@@ -61,12 +61,20 @@ class Shard:
 
     @classmethod
     def of_environment(cls, environment: Mapping[str, str] = os.environ) -> Self | None:
-        """The shard of this task of a SLURM array; None outside of an array."""
+        """The shard of this task of a SLURM array; None outside of an array.
+
+        Raises:
+            InputError: Numbers that SLURM does not give.
+        """
         if TASK not in environment:
             return None
-        task = int(environment[TASK])
-        first = int(environment.get(FIRST_TASK, "0"))
-        last = int(environment.get(LAST_TASK, task))
+        try:
+            task = int(environment[TASK])
+            first = int(environment.get(FIRST_TASK, "0"))
+            last = int(environment.get(LAST_TASK, task))
+        except ValueError as error:
+            reason = f"it or another variable of SLURM's is no number ({error})"
+            raise InputError(TASK, reason, f"Unset {TASK} outside of an array.") from error
         return cls(task - first, last - first + 1, first, of_array=True)
 
     def within(self, begun: tuple[int, int] | None) -> Self:

@@ -72,6 +72,25 @@ def test_units_that_failed_changed_or_lost_their_files_are_done_again(out) -> No
     assert [tries(out, unit.id) for unit in UNITS] == [2, 2, 2, 2, 1]
 
 
+def test_a_record_that_was_changed_by_hand_is_none(out) -> None:
+    results(out, Counting(out))
+    path = out / ".derain" / "units" / "drive" / "1.json"
+    record = json.loads(path.read_bytes())
+    path.write_text(json.dumps({**record, "seconds": "few"}))
+    assert [unit.id for unit in job_status(out, lambda record: None).missing] == ["drive/1"]
+    results(out, Counting(out))
+    assert [tries(out, unit.id) for unit in UNITS] == [1, 2, 1, 1, 1]
+
+
+def test_a_record_of_derain_02_which_has_no_checksum_counts(out) -> None:
+    results(out, Counting(out))
+    for path in (out / ".derain" / "units").rglob("*.json"):
+        record = json.loads(path.read_bytes())
+        del record["checksum"]
+        path.write_text(json.dumps(record))
+    assert job_status(out, lambda record: None).done == len(UNITS)
+
+
 def test_other_options_are_refused_and_named(out) -> None:
     results(out, Counting(out))
     with pytest.raises(InputError, match="size was 3 and is 4"):
@@ -135,10 +154,13 @@ def test_a_folder_without_a_job_has_no_status(out) -> None:
     (out / ".derain").mkdir()
     with pytest.raises(InputError, match="no records of a job"):
         Job.at(out)
-    for content in ("", "[]", json.dumps({"options": 3, "shards": None})):
+    broken = [{"options": 3, "shards": None}, *({"options": {}, "shards": s} for s in ("a", [1]))]
+    for content in ("", "[]", *map(json.dumps, broken)):
         (out / ".derain" / "job.json").write_text(content)
         with pytest.raises(InputError, match=r"job\.json, are damaged"):
             Job.at(out)
     (out / ".derain" / "job.json").write_text(json.dumps({"options": {}, "shards": None}))
-    with pytest.raises(InputError, match="not listed"):
-        job_status(out, lambda record: None)
+    for listed in ("", '[["drive/0", "large", ""]]'):
+        (out / ".derain" / "units.json").write_text(listed)
+        with pytest.raises(InputError, match="not listed"):
+            job_status(out, lambda record: None)

@@ -69,3 +69,9 @@ def test_a_shard_that_is_not_there_is_refused() -> None:
     for text in ("4", "a/b", "-1/4", "1/0x4"):
         with pytest.raises(ValueError, match="I/N"):
             Shard.of_text(text)
+
+
+@pytest.mark.parametrize("name", ["SLURM_ARRAY_TASK_ID", "SLURM_ARRAY_TASK_MAX"])
+def test_a_variable_of_slurm_that_is_no_number_is_refused(name) -> None:
+    with pytest.raises(InputError, match="SLURM_ARRAY_TASK_ID"):
+        Shard.of_environment({"SLURM_ARRAY_TASK_ID": "1", name: ""})
