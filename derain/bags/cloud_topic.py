@@ -57,6 +57,8 @@ class CloudTopic:
         self._next: int | None = None  # number of the cloud that the messages yield next
         self._last: tuple[int, Message] | None = None  # the cloud that they yielded last
         self._times: Ints | None = None
+        # Why there are no clouds after those whose times are known.
+        self._end = self.bag.too_few_clouds(self.topic)
         self._layouts: set[tuple[PointField, ...]] = set()
         self._first_of_stamp: dict[int, int] = {}
         self._warned_of_stamps = False
@@ -135,14 +137,19 @@ class CloudTopic:
     def _times_with(self, number: int) -> Ints:
         """Time at which the clouds were recorded and taken, nanoseconds, (M, 2).
 
-        The first call reads through the topic. The index may name more clouds than there are:
-        then one that is not there raises an InputError.
+        The first call reads through the topic, up to the first damage. A cloud behind that, or one
+        that the index alone names, raises an InputError.
         """
         if self._times is None:
-            times = [(each.time, self._taken(each)) for each in self.bag.messages(self.topic)]
+            times: list[tuple[int, int]] = []
+            messages = self.bag.messages(self.topic)
+            try:
+                times.extend((each.time, self._taken(each)) for each in messages)
+            except InputError as error:
+                self._end = error
             self._times = np.array(times, np.int64).reshape(-1, 2)
         if number >= len(self._times):
-            raise self.bag.too_few_clouds(self.topic)
+            raise self._end.with_traceback(None)
         return self._times
 
     def _taken(self, message: Message) -> int:

@@ -2,6 +2,7 @@
 
 import pickle
 import random
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from benchmarks.recorded_bags import (
     Ros,
     table_of,
 )
+from derain.bags.bag import Bag, Message
 from derain.errors import InputError
 from derain.files.labels import write_labels
 from derain.sources.folders import frame_of, named_frames
@@ -80,6 +82,29 @@ def test_any_order_gives_the_same_clouds_also_of_one_time(tmp_path, storage, per
     random.Random(1).shuffle(order)
     for number in order:
         np.testing.assert_array_equal(source[number].read().xyz[:, 0], clouds[number]["x"])
+
+
+@pytest.mark.parametrize("first", [0, 15])
+def test_what_lies_before_damage_is_read_and_not_again_for_each_cloud_behind_it(
+    tmp_path, monkeypatch, first
+) -> None:
+    source = named_frames([small_bag(tmp_path, "mcap", clouds=tables(40, points=20))])
+    whole, read = Bag.messages_of, []
+
+    def up_to_damage(bag: Bag, *arguments: object) -> Iterator[Message]:
+        for message in whole(bag, *arguments):
+            if message.time >= START + 20 * PERIOD:
+                raise InputError(bag.path, "is damaged", "Repair it.")
+            read.append(message)
+            yield message
+
+    monkeypatch.setattr(Bag, "messages_of", up_to_damage)
+    for frame in source[first:20]:
+        frame.read()
+    for frame in source[20:]:
+        with pytest.raises(InputError, match="is damaged"):
+            frame.read()
+    assert len(read) <= 2 * 20
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
