@@ -68,7 +68,7 @@ class RecordedDerainer(PlacedMethod):
         delay: Scans after it, which it has to wait for.
 
     Raises:
-        InputError: Numbers of scans below 0, or a model that sees several scans itself.
+        InputError: Other numbers of scans than 0 to 50, or a model that sees several scans itself.
     """
 
     def __init__(self, model: Derainer, past: int = 1, delay: int = 0) -> None:

@@ -23,9 +23,6 @@ from derain.views.one_viewpoint import viewpoint_issues
 from derain.views.scan_issues import ScanIssue, intensity_in_places
 from derain.views.window import Window, WindowOfScans
 
-# Scans kept at a time are bounded: each takes some 30 MB with its neighbours and rays.
-MOST_SCANS = 50
-
 
 @dataclass(frozen=True)
 class Persistence:
@@ -46,8 +43,7 @@ class Persistence:
     sure: float = 3.0
 
     def __post_init__(self) -> None:
-        for name in ("before", "after"):  # whatever a user gave
-            Entry("persistence", name, getattr(self, name)).whole(0, MOST_SCANS)
+        Window(self.before, self.after)  # which refuses other numbers
         sure = Entry("persistence", "sure", self.sure)
         if sure.number() < 1:
             raise sure.fault(f"{self.sure:g} is not 1 or more", "Give the odds of a sure answer.")

@@ -5,8 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from derain.errors import InputError
+from derain.files.documents import Entry
 from derain.scan import Floats, Scan
+
+# Scans kept at a time are bounded: each takes some 30 MB with its neighbours and rays.
+MOST_SCANS = 50
 
 
 @dataclass(frozen=True)
@@ -18,16 +21,15 @@ class Window:
         after: Scans after it, for which the answer has to wait.
 
     Raises:
-        InputError: Numbers below 0.
+        InputError: Other numbers than 0 to 50.
     """
 
     before: int = 0
     after: int = 0
 
     def __post_init__(self) -> None:
-        if min(self.before, self.after) < 0:
-            reason = f"{self.before} scans before and {self.after} after"
-            raise InputError("window", reason, "Give 0 or more.")
+        for name in ("before", "after"):  # whatever a user gave
+            Entry("window", name, getattr(self, name)).whole(0, MOST_SCANS)
 
     @property
     def is_one_scan(self) -> bool:

@@ -57,10 +57,11 @@ def test_a_view_of_one_scan_sees_nothing_of_those_around_it(view) -> None:
         np.testing.assert_array_equal(array, expected[name])
 
 
-def test_a_window_does_not_ask_for_less_than_nothing() -> None:
-    for wrong in ({"before": -1}, {"after": -2}):
-        with pytest.raises(InputError, match=r"window: .* Give 0 or more"):
-            Window(**wrong)
+@pytest.mark.parametrize("wrong", [-1, 51, 1.5, "two", None])
+@pytest.mark.parametrize("side", ["before", "after"])
+def test_a_window_has_a_number_of_scans_that_memory_holds(side, wrong) -> None:
+    with pytest.raises(InputError, match=rf"window: {side}: .* from 0 to 50"):
+        Window(**{side: wrong})
 
 
 @pytest.fixture
