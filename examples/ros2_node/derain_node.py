@@ -42,7 +42,7 @@ from derain.export.runtime import Derainer, Judgement
 from derain.files import read_scan
 from derain.system.memory import keep_freed_memory
 from derain.views.scan_issues import MOST_RAIN
-from derain.weather.alarm import Alarm, Level
+from derain.weather.alarm import ERROR, Alarm, Level
 from derain.weather.scan_weather import ScanWeather
 from derain.weather.visibility import Visibility
 
@@ -208,13 +208,13 @@ def refuse(asked: dict[str, Any]) -> None:
     """Refuses parameters that no node can run with.
 
     Raises:
-        InputError: A topic that would clean its own clouds, or a queue that holds none.
+        InputError: A topic that is named twice, or a queue that holds no cloud.
     """
-    for name in ("output", "removed"):
-        if asked[name] == asked["input"]:
-            raise InputError(
-                name, f"it is the input, '{asked['input']}'", "Give a topic of its own."
-            )
+    named: dict[str, str] = {}
+    for name in ("input", "output", "removed"):
+        first = named.setdefault(asked[name], name)
+        if first != name:
+            raise InputError(name, f"it is the {first}, '{asked[name]}'", "Give it its own topic.")
     if asked["queue"] < 1:
         raise InputError("queue", f"{asked['queue']} clouds", "Give 1 or more.")
 
@@ -223,10 +223,14 @@ def reach_of(dry: str) -> Visibility:
     """The reach of a dry scan, a file.
 
     Raises:
-        InputError: It cannot be read.
+        InputError: It cannot be read, or shows too little to compare with.
     """
     scan = read_scan(Path(dry))
-    return ScanWeather.of(scan, np.zeros(len(scan), bool)).reach
+    reach = ScanWeather.of(scan, np.zeros(len(scan), bool)).reach
+    if reach.at_least < ERROR.above:
+        reason = f"its reach is {reach}, less than {ERROR.above:g} m, where the error ends"
+        raise InputError(dry, reason, "Give a dry scan of a wider place.")
+    return reach
 
 
 class DerainNode:

@@ -44,12 +44,16 @@ def test_it_runs_from_the_first_cloud_until_it_is_stopped(ros2_node, monkeypatch
         ({"model": "none.onnx"}, "none.onnx: "),
         ({"input": "a", "output": "a"}, "output: it is the input, 'a'"),
         ({"removed": "points"}, "removed: it is the input, 'points'"),
+        ({"output": "a", "removed": "a"}, "removed: it is the output, 'a'"),
         ({"queue": 0}, "queue: 0 clouds"),
+        ({"dry": "empty.bin"}, "empty.bin: its reach is not known"),
     ],
 )
 def test_what_it_cannot_run_with_is_logged_once_and_ends_it(
-    ros2_node, monkeypatch, parameters, reason
+    ros2_node, monkeypatch, tmp_path, parameters, reason
 ) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty.bin").touch()
     ros = Ros(Node(threads=1, **parameters), [])
     assert run_main(ros2_node, monkeypatch, ros) == 2
     (logged,) = ros.node.logger
