@@ -192,10 +192,10 @@ def teach(
         units are to be done.
 
     Raises:
-        InputError: Scans that are in no files; a folder that holds something else, or in which the
-            scans' own labels are; a scan that cannot be read or judged, unless the guard suppresses
-            the error; no point of which anything is known; records of other options in the folder;
-            an executor that has ended.
+        InputError: Scans that are in no files, or whose paths are not UTF-8; a folder that holds
+            something else, or in which the scans' own labels are; a scan that cannot be read or
+            judged, unless the guard suppresses the error; no point of which anything is known;
+            records of other options in the folder; an executor that has ended.
     """
     refuse_to_overwrite(out, source)
     fingerprint = method.fingerprint()
@@ -296,6 +296,11 @@ def refuse_to_overwrite(out: Path, source: Source) -> None:
         if not isinstance(frame, FileFrame):
             reason = "is not in a file, and cannot be found again"
             raise InputError(frame.name, reason, "Write it to one.")
+        try:
+            f"{os.path.realpath(frame.path)} {frame.sequence}".encode()
+        except UnicodeEncodeError as error:
+            reason = "its path is not UTF-8, and the manifest could not hold it"
+            raise InputError(frame.name, reason, "Rename its file or folder.") from error
     # Refuses the places where the scans' own labels are or would be searched for.
     for sink in (FolderSink(out / LABELS, again=False), LabelSink(out / LABELS, again=False)):
         sink.refuse_clashes(source)

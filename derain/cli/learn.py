@@ -29,6 +29,7 @@ from derain.cli.outputs import print_lines
 from derain.cli.playback import refuse_unusable, write_and_report
 from derain.default import DEFAULT
 from derain.sources.method import Method
+from derain.stores.url import place_of
 from derain.system.extras import EXPORT_LIBRARIES, TRAINING_LIBRARIES, require
 from derain.workflows.learn_config import STUDENTS, LearnConfig
 from derain.workflows.start import START_HELP
@@ -40,7 +41,10 @@ MOST_SHOWN = 100
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
     parser.add_argument(
-        "recording", nargs="+", type=Path, help="folders of consecutive scans, or bags, in order"
+        "recording",
+        nargs="+",
+        type=place_of,
+        help="folders of consecutive scans, or bags, in order",
     )
     parser.add_argument(
         "--out", type=file_named(".onnx"), required=True, help="the ONNX file to write"

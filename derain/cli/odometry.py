@@ -27,6 +27,7 @@ from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.sources.judging import Failures
 from derain.sources.records import POSES
+from derain.stores.url import place_of
 from derain.system.stopwatch import Stopwatch
 from derain.workflows.odometry import find_poses
 
@@ -34,7 +35,11 @@ from derain.workflows.odometry import find_poses
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
     parser.add_argument(
-        "sequences", nargs="+", type=Path, metavar="SEQUENCE", help="folders of consecutive scans"
+        "sequences",
+        nargs="+",
+        type=place_of,
+        metavar="SEQUENCE",
+        help="folders of consecutive scans",
     )
     parser.add_argument(
         "--out",

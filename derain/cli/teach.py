@@ -40,7 +40,6 @@ from derain.evaluation.text_tables import number_text
 from derain.export.methods import over_recording
 from derain.sources.folders import named_frames
 from derain.sources.judging import Failures
-from derain.stores.url import paths_of
 from derain.workflows.teaching import teach_recordings
 
 
@@ -68,7 +67,7 @@ def main(arguments: argparse.Namespace) -> int:
     method = over_recording(method_of(name, arguments))
     card = None if arguments.card is None else load_card(arguments.card)
     found = named_frames(
-        paths_of(scans),
+        scans,
         arguments.columns,
         labelled=True,
         layouts=layouts_for(card),

@@ -23,7 +23,7 @@ from derain.sources.records import Records
 from derain.sources.search import listed_scans, recordings_below, scans_or_bags
 from derain.sources.source import Frames, Source
 from derain.sources.unreadable_bag import UnreadableBag
-from derain.stores.url import is_url
+from derain.stores.url import is_url, paths_of
 
 # Returns the clouds of a bag, or those at a path into one. Arguments: the path; whether to read
 # labels; the prefix of the keys, which may be empty.
@@ -70,12 +70,13 @@ def named_frames(
         recording's path relative to that folder, which does not change if others are added.
 
     Raises:
-        InputError: A path that does not exist, a folder without scans, a named bag that cannot be
-            read, or a topic where there is no bag. A bag in a folder fails when it is read.
+        InputError: A URL, a path that does not exist, a folder without scans, a named bag that
+            cannot be read, or a topic where there is no bag. A bag in a folder fails when it is
+            read.
     """
     given = [paths] if isinstance(paths, str | Path) else paths
     finder = FrameFinder(columns, labelled, layouts, recordings, topic, results)
-    return finder.frames([or_example(Path(path)) for path in given])
+    return finder.frames([or_example(path) for path in paths_of(given)])
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Recordings are labelled by the answers of a method, and by nothing else."""
 
+import os
 import shutil
 from pathlib import Path
 
@@ -160,4 +161,14 @@ def test_where_nothing_is_known_or_scans_are_in_no_file_nothing_is_written(drive
     in_memory = Frames.of_scans([Scan.of(scene(9), name="mine")] * 3)
     with pytest.raises(InputError, match="is not in a file"):
         teach(Between(), in_memory, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", [b"dir\xff/000000.bin", b"dir/\xff.bin"])
+def test_a_name_that_the_manifest_could_not_hold_is_refused_before_any_work(tmp_path, name) -> None:
+    scan = tmp_path / os.fsdecode(name)
+    scan.parent.mkdir()
+    scene(POINTS).tofile(scan)
+    with pytest.raises(InputError, match="not UTF-8"):
+        teach(FilterDerainer(DROR(), 1), named_frames(scan), tmp_path / "out")
     assert not (tmp_path / "out").exists()

@@ -59,6 +59,11 @@ def test_a_data_set_is_its_sequences(wads) -> None:
         assert [frame.number for frame in frames] == [0, 1, 0, 1]
 
 
+def test_a_url_is_no_path_of_this_machine() -> None:
+    with pytest.raises(InputError, match=r"^s3://bucket/drive: is not on this machine"):
+        named_frames("s3://bucket/drive")
+
+
 def test_one_sequence_has_plain_names(wads, monkeypatch) -> None:
     for named in (wads / "sequences/02", wads / "sequences/02/velodyne"):
         frames = named_frames([named])
