@@ -20,6 +20,7 @@ from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
+from derain.sources.search import mark_as_results
 from derain.sources.sink import FolderSink
 from derain.sources.source import Source
 from derain.sources.stored_frame import StoredBag
@@ -96,6 +97,9 @@ class CleanSink:
 
     def __exit__(self, kind: object, *_: object) -> None:
         self._bags.end(failed=kind is not None)
+        for sink in filter(None, (self._files, self._removed)):
+            if sink.folder.is_dir() and self._is_among_scans(sink.folder):
+                mark_as_results(sink.folder)
 
     def targets(self) -> Iterator[Path]:
         """Every file and bag that it may write."""
@@ -162,6 +166,11 @@ class CleanSink:
         )
         counts = (f"{written:,} of {there:,} {what}" for written, there, what in parts if there)
         return f"{' and '.join(counts)} are written, each of them whole"
+
+    def _is_among_scans(self, folder: Path) -> bool:
+        """True if a folder lies in the one that holds all scans."""
+        scans = [frame.path.absolute() for frame in self._source if isinstance(frame, FileFrame)]
+        return bool(scans) and folder.absolute().is_relative_to(os.path.commonpath(scans))
 
     def _is_in_bag(self, frame: Frame) -> bool:
         return frame in self._stored_bags or self._bags.takes(frame)

@@ -173,6 +173,11 @@ class _Search:
         return found
 
 
+def mark_as_results(folder: Path) -> None:
+    """Has a later search pass over a folder of results, by an empty folder of records."""
+    (folder / JOB_RECORDS).mkdir(exist_ok=True)
+
+
 def _is_of_job(folder: str) -> bool:
     """True if a folder holds results with records; a simulated data set has records, too."""
     names = (JOB_RECORDS, MANIFEST_OF_SIMULATION)

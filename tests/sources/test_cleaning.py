@@ -53,3 +53,17 @@ def test_a_name_and_a_filter_alone_are_no_methods(tmp_path, given) -> None:
     scans = write_scenes(tmp_path / "scans", 200, name="{}.bin")
     with pytest.raises(derain.InputError, match=f"{type(given).__name__} is no method"):
         derain.clean(scans, given, tmp_path / "out")
+
+
+@pytest.mark.parametrize("keeps", [False, True], ids=["without records", "with records"])
+def test_results_among_the_recordings_are_none_to_a_later_run(tmp_path, keeps) -> None:
+    drives = tmp_path / "drives"
+    for name in "ab":
+        write_scenes(drives / name, 200, 200)
+    source = derain.named_frames(drives)
+    dror, division = derain.FilterDerainer(derain.DROR()), derain.Division(keep_records=keeps)
+    with derain.CleanSink(drives / "out/clean", source, removed=drives / "out/rain") as sink:
+        report = derain.clean(source, dror, sink, most_removed=1, division=division)
+    assert len(report.scans) == 4
+    later = [frame.name for frame in derain.named_frames(drives)]
+    assert later == [frame.name for frame in source]
