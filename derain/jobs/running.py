@@ -316,7 +316,12 @@ def _run_on_executor(
     pickled = pickle.dumps(task)
     waiting: deque[tuple[UnitT, list[ResultT] | None, Any]] = deque()
     for unit, done in task.done(units):
-        future = executor.submit(do_unit, pickled, unit) if done is None else None
+        future = None
+        if done is None:
+            try:
+                future = executor.submit(do_unit, pickled, unit)
+            except RuntimeError as error:  # it is shut down, or broken
+                raise _ended(unit, error) from error
         waiting.append((unit, done, future))
         while waiting and (len(waiting) > AHEAD or waiting[0][2] is None or waiting[0][2].done()):
             yield from _next_results(task, waiting)
@@ -342,11 +347,7 @@ def _await_results(task: Task[UnitT, ResultT], unit: UnitT, future: Any) -> Sequ
         results: list[ResultT] = future.result()
         return results
     except (BrokenExecutor, CancelledError) as error:
-        raise InputError(
-            "executor",
-            f"it ended before {unit.id} was done ({error or type(error).__name__})",
-            "Run the same command again: it does the remaining units.",
-        ) from error
+        raise _ended(unit, error) from error
     except UnfitWorkerError:
         raise
     except InputError as error:
@@ -354,6 +355,15 @@ def _await_results(task: Task[UnitT, ResultT], unit: UnitT, future: Any) -> Sequ
     except Exception as error:  # the executor's own processes may raise anything
         reason = f"its worker failed ({type(error).__name__}: {error})"
         return task.fail(unit, InputError(unit.id, reason, "See the log of the worker."))
+
+
+def _ended(unit: Unit, error: BaseException) -> InputError:
+    """The error of an executor that does no further unit."""
+    return InputError(
+        "executor",
+        f"it ended before {unit.id} was done ({error or type(error).__name__})",
+        "Run the same command again: it does the remaining units.",
+    )
 
 
 def do_unit(pickled: bytes, unit: UnitT) -> list[Any]:

@@ -138,6 +138,13 @@ def test_an_executor_that_has_ended_is_reported_and_the_rest_is_done_later(out) 
     assert results(out, Counting(out))[0] == ("drive/0 done", True)
 
 
+def test_an_executor_that_had_ended_before_is_reported(out) -> None:
+    pool = ThreadPoolExecutor(1)
+    pool.shutdown()
+    with pytest.raises(InputError, match="executor: it ended before drive/0"):
+        results(out, Counting(out), pool)
+
+
 def test_the_status_names_what_is_to_be_done_again(out) -> None:
     job = Job.begin(out, OPTIONS, UNITS, Shard(0, 5, first=1))
     done = UNITS[:2]
