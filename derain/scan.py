@@ -25,10 +25,12 @@ FEWEST_ALIKE = 100
 # SemanticKITTI-style range images mark a cell without a return by -1 in every column.
 SENTINEL = -1.0
 
-# Types of arrays: of float64, int64 and bool. Docstrings give the shapes.
+# Types of arrays: of float64, float32, int64, bool, and of any type. Docstrings give the shapes.
 Floats = NDArray[np.float64]
+Float32s = NDArray[np.float32]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+Array = NDArray[Any]
 
 Named = TypeVar("Named")
 

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.bags.bag import Bag
 from derain.bags.cloud_topic import CloudTopic
@@ -19,7 +18,7 @@ from derain.errors import InputError
 from derain.evaluation.ray_counts import RayCounts
 from derain.files.labels import read_labels, semantic
 from derain.files.reading import reading
-from derain.scan import Scan
+from derain.scan import Array, Scan
 from derain.sources.folders import frame_of
 from derain.sources.frame import Frame
 from derain.system.extras import CHECKPOINT_LIBRARIES, require
@@ -116,7 +115,7 @@ def _of_scan(scan: Scan, frame: Frame, card: DataCard | None) -> dict[str, Any]:
     return facts
 
 
-def _span(values: NDArray[Any]) -> dict[str, float] | str:
+def _span(values: Array) -> dict[str, float] | str:
     """Bounds and median of the finite values: JSON has no NaN and no infinity."""
     values = values[np.isfinite(values)]
     if not len(values):

@@ -7,9 +7,6 @@ Every column of a file comes back in `Scan.fields`, in its own dtype, and is wri
 import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
-
-from numpy.typing import NDArray
 
 from derain.errors import InputError, ScanWarning
 from derain.files.atomic import replacing
@@ -19,7 +16,7 @@ from derain.files.format import FORMATS, format_of
 from derain.files.frame_times import METADATA
 from derain.files.names import is_compressed, scan_suffix
 from derain.files.reading import reading
-from derain.scan import PartialHeader, Scan
+from derain.scan import Array, PartialHeader, Scan
 
 __all__ = ["DEFAULT_COLUMNS", "count_points", "find_scans", "read_scan", "write_scan"]
 
@@ -70,7 +67,7 @@ def count_points(path: Path, columns: Sequence[str] = DEFAULT_COLUMNS) -> int:
     return len(read_scan(path, columns)) if counted is None else counted
 
 
-def write_scan(path: Path | str, scan: Scan | NDArray[Any]) -> None:
+def write_scan(path: Path | str, scan: Scan | Array) -> None:
     """Writes one scan: every column of the file it came from, else coordinates and intensity.
 
     What the scan's file holds besides and cannot be written is warned of by ScanWarning.

@@ -6,12 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.names import scan_suffix
 from derain.files.text import encode
-from derain.scan import Scan, named, to_float32
+from derain.scan import Array, Float32s, Scan, named, to_float32
 
 # KITTI, SemanticKITTI, WADS and REHEARSE-3D.
 DEFAULT_COLUMNS = ("x", "y", "z", "intensity")
@@ -20,9 +19,7 @@ DEFAULT_COLUMNS = ("x", "y", "z", "intensity")
 INTENSITY_NAMES = ("intensity", "i", "intensities", "reflectivity", "remission", "signal")
 
 
-def name_columns(
-    path: Path, columns: Sequence[NDArray[Any]], names: Sequence[str]
-) -> dict[str, NDArray[Any]]:
+def name_columns(path: Path, columns: Sequence[Array], names: Sequence[str]) -> dict[str, Array]:
     """Gives the columns of a file without names the names stated by the user.
 
     Args:
@@ -50,7 +47,7 @@ def name_columns(
 
 def scan_of(
     path: Path,
-    fields: Mapping[str, NDArray[Any]],
+    fields: Mapping[str, Array],
     shape: tuple[int, int] | None = None,
     header: object = None,
 ) -> Scan:
@@ -98,9 +95,7 @@ def intensity_name(subject: str | Path, names: Iterable[str]) -> str | None:
     return next((name for name in found if name is not None), None)
 
 
-def _numbers(
-    fields: Mapping[str, NDArray[Any]], *axes: int, kinds: str = "iuf"
-) -> dict[str, NDArray[Any]]:
+def _numbers(fields: Mapping[str, Array], *axes: int, kinds: str = "iuf") -> dict[str, Array]:
     """The columns that hold numbers and have one of these numbers of axes."""
     return {
         name: column
@@ -109,7 +104,7 @@ def _numbers(
     }
 
 
-def _coordinates(path: Path, fields: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
+def _coordinates(path: Path, fields: Mapping[str, Array]) -> Float32s:
     """Coordinates among a file's columns, float32 (N, 3)."""
     table = named(_numbers(fields, 1, 2), "xyz", path)
     if table is not None:
@@ -126,7 +121,7 @@ def _coordinates(path: Path, fields: Mapping[str, NDArray[Any]]) -> NDArray[np.f
     return np.stack([to_float32(axis) for axis in axes], axis=1)
 
 
-def _refuse_unusable(path: Path, fields: Mapping[str, NDArray[Any]]) -> None:
+def _refuse_unusable(path: Path, fields: Mapping[str, Array]) -> None:
     """Refuses coordinates that are there by their names, but not as numbers of each point."""
     usable = _numbers(fields, 1)
     columns = {name: named(fields, name, path) for name in ("xyz", *"xyz")}
@@ -143,12 +138,12 @@ def _refuse_unusable(path: Path, fields: Mapping[str, NDArray[Any]]) -> None:
         )
 
 
-def _kind(column: NDArray[Any]) -> str:
+def _kind(column: Array) -> str:
     """Type of a column's values, and their shape at each point."""
     return f"{column.dtype}{f' of shape {column.shape[1:]}' if column.ndim > 1 else ''}"
 
 
-def columns_of(scan: Scan) -> dict[str, NDArray[Any]]:
+def columns_of(scan: Scan) -> dict[str, Array]:
     """The columns of a scan in a file.
 
     Returns:
@@ -157,7 +152,7 @@ def columns_of(scan: Scan) -> dict[str, NDArray[Any]]:
         format can hold.
     """
     from_memory = {"xyz": scan.xyz, "intensity": scan.intensity}
-    columns: dict[str, NDArray[Any]] = {}
+    columns: dict[str, Array] = {}
     for name, column in (scan.fields or from_memory).items():
         if name == "xyz" and column is not None:
             columns |= {axis: column[:, place] for place, axis in enumerate("xyz")}
@@ -166,7 +161,7 @@ def columns_of(scan: Scan) -> dict[str, NDArray[Any]]:
     return columns
 
 
-def with_column(scan: Scan, name: str, column: NDArray[Any]) -> Scan:
+def with_column(scan: Scan, name: str, column: Array) -> Scan:
     """The same scan with a further column in its file; one that has this name is replaced.
 
     Args:
@@ -180,7 +175,7 @@ def with_column(scan: Scan, name: str, column: NDArray[Any]) -> Scan:
     return replace(scan, fields={**(scan.fields or columns_of(scan)), name: column})
 
 
-def describable_columns(path: Path, scan: Scan, types: Collection[str]) -> dict[str, NDArray[Any]]:
+def describable_columns(path: Path, scan: Scan, types: Collection[str]) -> dict[str, Array]:
     """The columns of a scan for a format whose header describes each in a line of text.
 
     Args:
@@ -206,15 +201,13 @@ def describable_columns(path: Path, scan: Scan, types: Collection[str]) -> dict[
     return columns
 
 
-def no_place(
-    path: Path, name: str, column: NDArray[Any], remedy: str = "Write .npz."
-) -> InputError:
+def no_place(path: Path, name: str, column: Array, remedy: str = "Write .npz.") -> InputError:
     """The error of a column that a format cannot hold."""
     reason = f"{scan_suffix(path)} has no place for the column '{name}' ({_kind(column)})"
     return InputError(path, reason, remedy)
 
 
-def records(columns: Mapping[str, NDArray[Any]], row: np.dtype[Any]) -> NDArray[Any]:
+def records(columns: Mapping[str, Array], row: np.dtype[Any]) -> Array:
     """Columns of N rows each as one structured array (N,).
 
     Args:

@@ -4,10 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.files.documents import Entry
-from derain.scan import Floats, to_float32
+from derain.scan import Float32s, Floats, to_float32
 
 POSE = ("x", "y", "z", "roll", "pitch", "yaw")
 
@@ -59,7 +58,7 @@ class Extrinsics:
         matrix[:3, 3] = x, y, z
         return cls(matrix)
 
-    def __call__(self, xyz: NDArray[np.float32]) -> NDArray[np.float32]:
+    def __call__(self, xyz: Float32s) -> Float32s:
         """Moves points, float32 (N, 3), metres."""
         return to_float32(xyz @ self.matrix[:3, :3].T + self.matrix[:3, 3])
 

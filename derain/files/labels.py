@@ -5,7 +5,6 @@ Source: Behley et al. 2019, SemanticKITTI; github.com/PRBonn/semantic-kitti-api,
 
 import os
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,7 @@ from derain.errors import InputError
 from derain.files.atomic import replacing
 from derain.files.names import beside
 from derain.files.reading import file_size, read_bytes, reading
-from derain.scan import LARGEST_ID, Ints, class_ids
+from derain.scan import LARGEST_ID, Array, Ints, class_ids
 
 LABEL = ".label"
 
@@ -62,7 +61,7 @@ def instance(raw: NDArray[np.uint32]) -> Ints:
     return (raw >> 16).astype(np.int64)
 
 
-def write_labels(path: Path, semantic: NDArray[Any], instance: NDArray[Any] | None = None) -> None:
+def write_labels(path: Path, semantic: Array, instance: Array | None = None) -> None:
     """Writes one label per point.
 
     Args:

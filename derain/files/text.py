@@ -8,7 +8,8 @@ from itertools import chain, islice
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from derain.scan import Array
 
 # Bytes of a header, which has a line or a word for each column.
 LARGEST_HEADER = 2**20
@@ -33,9 +34,7 @@ def filled_lines(data: bytes, start: int = 0, count: int = sys.maxsize) -> Itera
     return islice(filled, *(min(place, sys.maxsize) for place in (start, start + count)))
 
 
-def parse_rows(
-    data: bytes, row: np.dtype[Any], start: int = 0, count: int = sys.maxsize
-) -> NDArray[Any]:
+def parse_rows(data: bytes, row: np.dtype[Any], start: int = 0, count: int = sys.maxsize) -> Array:
     """Reads one structured value per line of numbers; empty lines are skipped.
 
     Args:
@@ -58,7 +57,7 @@ def parse_rows(
     return np.loadtxt(chain([first], lines), row, comments=None, ndmin=1, encoding="latin-1")
 
 
-def format_rows(table: NDArray[Any]) -> bytes:
+def format_rows(table: Array) -> bytes:
     """Writes every value of a packed structured array (N,) as a line of numbers."""
     dtypes = [table.dtype[name] for name in table.dtype.names or ()]
     values = [dtype.base for dtype in dtypes for _ in range(math.prod(dtype.shape))]

@@ -14,7 +14,7 @@ from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.pictures.entities import SCAN, SHARE
 from derain.pictures.palette import shades
-from derain.scan import Bools, Floats, Scan
+from derain.scan import Bools, Float32s, Floats, Scan
 from derain.sources.frame import Frame, times_of
 from derain.sources.method import Method
 from derain.sources.reader import FrameReader
@@ -118,7 +118,7 @@ class Selection:
         return SensorLook.of(self.frames)
 
     @cached_property
-    def paths(self) -> list[NDArray[np.float32]]:
+    def paths(self) -> list[Float32s]:
         """The sensor's path in each sequence, float32 (scans, 3), metres."""
         paths: dict[str, list[Floats]] = {}
         for frame in self.frames:
@@ -231,7 +231,7 @@ class Labels:
         return LabelledRain(self.card.rain_of(labelled), ~self.card.unknown_of(labelled))
 
 
-def _nearly_all(values: Sequence[NDArray[np.float32]]) -> float:
+def _nearly_all(values: Sequence[Float32s]) -> float:
     """The 98th percentile, above 0; 1 of no values."""
     together = np.concatenate(values) if values else np.zeros(0)
     return max(float(np.percentile(together, 98)), 1e-6) if len(together) else 1.0

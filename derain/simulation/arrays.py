@@ -2,19 +2,18 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from derain.scan import Bools, Floats, Ints
+from derain.scan import Array, Bools, Floats, Ints
 
 
 @dataclass(frozen=True, eq=False)
 class Columns:
     """Arrays of one length, each an attribute of a class derived from this one."""
 
-    def take(self, rows: NDArray[Any]) -> Self:
+    def take(self, rows: Array) -> Self:
         """The rows of a mask, bool (N,), or by their numbers, int64 (M,)."""
         return type(self)(*(getattr(self, column.name)[rows] for column in fields(self)))
 

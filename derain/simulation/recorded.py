@@ -1,14 +1,12 @@
 """Rain on scans that were recorded in clear air."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from derain.files.columns import intensity_name
-from derain.scan import Bools, Floats, Ints, Scan, to_float32
+from derain.scan import Array, Bools, Floats, Ints, Scan, to_float32
 from derain.simulation.classes import TrackClass
 from derain.simulation.rain import rain_on_beams
 from derain.simulation.rain_field import RainField
@@ -167,13 +165,13 @@ def with_intensity(scan: Scan, rows: Ints, intensity: Floats) -> Scan:
     return replace(scan, intensity=seen, fields=fields)
 
 
-def _unit(column: NDArray[Any], scan: Scan) -> float:
+def _unit(column: Array, scan: Scan) -> float:
     """The number in a column of ranges that stands for one metre."""
     valid = scan.valid
     return float(np.median(column[valid] / scan.range[valid])) if valid.any() else 1.0
 
 
-def _written(column: NDArray[Any], rows: Ints, values: NDArray[Any]) -> NDArray[Any]:
+def _written(column: Array, rows: Ints, values: Array) -> Array:
     column = column.copy()
     if column.dtype.kind in "iu":
         limits = np.iinfo(column.dtype)

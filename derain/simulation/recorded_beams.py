@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
-from derain.scan import Bools, Floats, Ints, Scan
+from derain.scan import Bools, Float32s, Floats, Ints, Scan
 from derain.simulation.arrays import Columns
 from derain.simulation.sensor import unit_vectors
 from derain.views.directions import directions
@@ -127,7 +126,7 @@ def _unreturned(scan: Scan, valid: Bools, generator: Generator) -> RecordedBeams
     return RecordedBeams(row, unit_vectors(*_pixel_angles(fit, chosen)), np.zeros(len(row), bool))
 
 
-def _looked_at(fit: GridFit, xyz: NDArray[np.float32], pixel: Ints) -> Bools:
+def _looked_at(fit: GridFit, xyz: Float32s, pixel: Ints) -> Bools:
     """True if pixels lie in the convex hull of the returns, bool (P,)."""
     azimuth, inclination = directions(xyz)
     across, up = _pixel_angles(fit, pixel)

@@ -6,9 +6,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from derain.scan import Floats, Ints
+from derain.scan import Array, Float32s, Floats, Ints
 from derain.simulation.classes import TrackClass
 from derain.simulation.objects import Surface
 from derain.simulation.sensor import Returns, Sensor
@@ -28,7 +27,7 @@ class Track:
             :func:`backscatter`.
     """
 
-    triangles: NDArray[np.float32]
+    triangles: Float32s
     reflectivity: Floats
     label: Ints
     roughness: Floats | float = 0.0
@@ -90,7 +89,7 @@ class Track:
         label[hit] = self.label[triangle]
         return Returns(distance, reflectivity, label, np.arange(len(beams)))
 
-    def _hits(self, rays: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
+    def _hits(self, rays: Float32s) -> dict[str, Array]:
         """The first triangle on each ray as Open3D finds it; float32 (N, 6): origin, direction."""
         tensor = import_open3d().core.Tensor
         return {name: hit.numpy() for name, hit in self._scene.cast_rays(tensor(rays)).items()}

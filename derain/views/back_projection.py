@@ -2,12 +2,10 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from derain.scan import Bools, Floats, Ints
+from derain.scan import Array, Bools, Float32s, Floats, Ints
 
 # Pixels on each side of a point's own that a back-projection may choose from: a window of
 # 5 × 5.
@@ -53,15 +51,15 @@ class ProjectedPoints:
     """
 
     pixel: Ints
-    range: NDArray[np.float32]
-    nearest: NDArray[np.float32]
+    range: Float32s
+    nearest: Float32s
     wraps: bool
 
 
-PixelsToPoints = Callable[[ProjectedPoints, NDArray[np.float32]], NDArray[np.float32]]
+PixelsToPoints = Callable[[ProjectedPoints, Float32s], Float32s]
 
 
-def copy(points: ProjectedPoints, score: NDArray[np.float32]) -> NDArray[np.float32]:
+def copy(points: ProjectedPoints, score: Float32s) -> Float32s:
     """Gives every point the score of its own pixel.
 
     Args:
@@ -74,7 +72,7 @@ def copy(points: ProjectedPoints, score: NDArray[np.float32]) -> NDArray[np.floa
     return score.take(points.pixel)
 
 
-def nearest_range(points: ProjectedPoints, score: NDArray[np.float32]) -> NDArray[np.float32]:
+def nearest_range(points: ProjectedPoints, score: Float32s) -> Float32s:
     """Gives every point the score of the pixel around it that shows the range most like its own.
 
     A point that is shown has its own pixel's. What is hidden behind a drop follows the surface
@@ -97,7 +95,7 @@ def nearest_range(points: ProjectedPoints, score: NDArray[np.float32]) -> NDArra
     return result
 
 
-def vote(points: ProjectedPoints, score: NDArray[np.float32]) -> NDArray[np.float32]:
+def vote(points: ProjectedPoints, score: Float32s) -> Float32s:
     """Lets the pixels around every point vote: the published k-NN search, mended for two classes.
 
     Of the window, the pixels most like the point in range vote rain if their score is above one
@@ -146,7 +144,7 @@ class _Window:
         ]
         self._nearest = self.with_margin(points.nearest, np.inf)
 
-    def with_margin(self, image: NDArray[Any], value: float) -> NDArray[Any]:
+    def with_margin(self, image: Array, value: float) -> Array:
         """An image (H, W), padded and flat.
 
         On a full circle its sides continue at the other end; all else of the margin has one value.
@@ -160,7 +158,7 @@ class _Window:
             rows[:, -REACH:] = image.take(range(width, width + REACH), axis=1, mode="wrap")
         return padded.ravel()
 
-    def closest_in_range(self, pixel: Ints, distance: NDArray[np.float32]) -> Ints:
+    def closest_in_range(self, pixel: Ints, distance: Float32s) -> Ints:
         """The pixel around each pixel that shows the range most like a point's, int64 (N,)."""
         best = np.zeros(len(pixel), np.uint8)
         least = np.full(len(pixel), np.inf, np.float32)
@@ -176,7 +174,7 @@ class _Window:
             column %= self._width
         return np.asarray((row + down.take(best)) * self._width + column)
 
-    def share_of_votes(self, pixel: Ints, distance: NDArray[np.float32], rain: Bools) -> Floats:
+    def share_of_votes(self, pixel: Ints, distance: Float32s, rain: Bools) -> Floats:
         """Share of rain among the votes of the pixels around each pixel, float64 (N,)."""
         corner = self._corner(pixel)
         voters = np.empty((len(pixel), len(WINDOW_STEPS)), VOTER)
@@ -191,9 +189,7 @@ class _Window:
         for_rain = chosen["ballot"] % 2 == 1
         return np.asarray((votes & for_rain).sum(axis=0) / votes.sum(axis=0))
 
-    def _differences(
-        self, pixel: Ints, distance: NDArray[np.float32]
-    ) -> Iterator[NDArray[np.float32]]:
+    def _differences(self, pixel: Ints, distance: Float32s) -> Iterator[Float32s]:
         """Differences in range between the pixels around each pixel and a point, step by step."""
         corner = self._corner(pixel)
         for step in self._steps:

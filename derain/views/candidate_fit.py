@@ -5,10 +5,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.scan import Bools, Scan
+from derain.scan import Bools, Float32s, Scan
 from derain.views.candidates import Bound, Candidates, bounded_channels
 from derain.views.channels import channel_values
 from derain.views.morton import first_rows
@@ -92,7 +91,7 @@ class _Side:
 
     channel: str
     is_most: bool
-    values: NDArray[np.float32]
+    values: Float32s
     rain: Bools
 
     def limit(self, outside: float) -> float:
@@ -118,7 +117,7 @@ class _Side:
 
 def _gathered(
     scans: Iterable[tuple[Scan, Bools]], channels: Sequence[str]
-) -> tuple[NDArray[np.float32], Bools]:
+) -> tuple[Float32s, Bools]:
     """Values of all distinct positions, float32 (C, M), and which are rain, bool (M,)."""
     values, rain = [np.zeros((len(channels), 0), np.float32)], [np.zeros(0, bool)]
     for scan, is_rain in scans:

@@ -5,10 +5,9 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.files.documents import Entry
-from derain.scan import Bools, Scan
+from derain.scan import Bools, Float32s, Scan
 from derain.views.channels import MOST_CHANNELS
 
 # Bounds are compared as float32, as which a larger number would be infinite.
@@ -29,7 +28,7 @@ class Bound:
     least: float | None = None
     most: float | None = None
 
-    def holds(self, values: NDArray[np.float32]) -> Bools:
+    def holds(self, values: Float32s) -> Bools:
         """True for values within the bound, bool (N,); also True for unknown values, NaN."""
         outside = np.zeros(len(values), bool)
         # Nothing is less or greater than NaN. A bound as float32 compares as fast as can be.

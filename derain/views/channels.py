@@ -8,9 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from derain.scan import Ints, Scan
+from derain.scan import Float32s, Ints, Scan
 
 # The default channels of networks. All other channels are extra: a scan need not have them, and a
 # data card has their statistics only after a network has used them.
@@ -39,7 +38,7 @@ def with_columns(scan: Scan, channels: Sequence[str]) -> Scan:
     return replace(scan, fields=present)
 
 
-def channel_values(scan: Scan, rows: Ints, channels: Sequence[str]) -> NDArray[np.float32]:
+def channel_values(scan: Scan, rows: Ints, channels: Sequence[str]) -> Float32s:
     """Values of a channel at some points of a scan.
 
     Args:
@@ -58,7 +57,7 @@ def channel_values(scan: Scan, rows: Ints, channels: Sequence[str]) -> NDArray[n
 
 def filled_values(
     scan: Scan, rows: Ints, channels: Sequence[str], fill_value: Mapping[str, float]
-) -> NDArray[np.float32]:
+) -> Float32s:
     """Values of channels at some points of a scan, with replacements for missing ones.
 
     Args:
@@ -82,7 +81,7 @@ def filled_values(
 
 def channel_image(
     scan: Scan, winner: Ints, channels: Sequence[str], fill_value: Mapping[str, float]
-) -> NDArray[np.float32]:
+) -> Float32s:
     """Values of channels in the pixels of an image, with replacements for missing ones.
 
     Args:
@@ -102,7 +101,7 @@ def channel_image(
     return image
 
 
-def _column(scan: Scan, name: str) -> NDArray[np.float32]:
+def _column(scan: Scan, name: str) -> Float32s:
     """A channel of all rows, float32 (N,); NaN where the scan lacks it."""
     column = scan.channel(name)
     return np.full(len(scan), np.nan, np.float32) if column is None else column

@@ -7,12 +7,11 @@ contain a border are unsure, and so are bins so near to one that rounding may ch
 """
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.scan import Floats, Ints
+from derain.scan import Array, Float32s, Floats, Ints
 
 # Bins of each table. A grid of 2048 columns leaves 32 of them to a column, one of which is unsure.
 BINS = 2**16
@@ -58,7 +57,7 @@ class DirectionTable:
         self._first_pixels = _table(first_pixel(_inclination(middles)), heights)
         self._columns = _table(column(_azimuth(middles)), turns)
 
-    def __call__(self, xyz: NDArray[np.float32]) -> Ints:
+    def __call__(self, xyz: Float32s) -> Ints:
         """Looks up points.
 
         Args:
@@ -74,7 +73,7 @@ class DirectionTable:
             pixel[part] = self._look_up(xyz[part])
         return pixel
 
-    def _look_up(self, xyz: NDArray[np.float32]) -> NDArray[np.int32]:
+    def _look_up(self, xyz: Float32s) -> NDArray[np.int32]:
         # An overflow or a division by zero ends up unsure.
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
             x, y, z = np.ascontiguousarray(xyz.T, dtype=np.float32)
@@ -98,26 +97,26 @@ def _table(of_bins: Ints, borders: Floats) -> NDArray[np.int32]:
     return table
 
 
-def height_of(z: NDArray[Any], distance: NDArray[Any] | float) -> NDArray[Any]:
+def height_of(z: Array, distance: Array | float) -> Array:
     """The sine of the inclination, in bins from 0 to BINS."""
     return (z / distance + 1) * (BINS // 2)
 
 
-def _inclination(height: NDArray[Any]) -> Floats:
+def _inclination(height: Array) -> Floats:
     """Inclination of a height, degrees."""
     return np.degrees(np.arcsin(height / (BINS // 2) - 1))
 
 
-def turn_of(x: NDArray[Any], y: NDArray[Any]) -> NDArray[Any]:
+def turn_of(x: Array, y: Array) -> Array:
     """The distance from straight behind, counter-clockwise, in bins from 0 to BINS.
 
     It is measured along the square |x| + |y| = 1, each of whose sides replaces an arc.
     """
-    distance: NDArray[Any] = 2 + np.copysign(1 - x / (np.abs(x) + np.abs(y)), y)
+    distance: Array = 2 + np.copysign(1 - x / (np.abs(x) + np.abs(y)), y)
     return distance * (BINS // 4)
 
 
-def _azimuth(turn: NDArray[Any]) -> Floats:
+def _azimuth(turn: Array) -> Floats:
     """Azimuth of a turn, degrees."""
     distance = turn / (BINS // 4) - 2
     x = 1 - np.abs(distance)

@@ -6,9 +6,8 @@ a rosette, of several sensors or of a shaken one do, there are about as many a l
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from derain.scan import Bools, Floats, Ints
+from derain.scan import Bools, Float32s, Floats, Ints
 
 # Returns of one ray differ by at most this much in direction, degrees: by the rounding of
 # coordinates to float32, or to millimetres. Of these the largest counts at which the returns of
@@ -29,7 +28,7 @@ CLEARLY_MORE = 5
 SLAB_SPACING = 1000
 
 
-def directions(xyz: NDArray[np.float32]) -> tuple[Floats, Floats]:
+def directions(xyz: Float32s) -> tuple[Floats, Floats]:
     """Azimuth and inclination of every point.
 
     Args:
@@ -48,7 +47,7 @@ def directions(xyz: NDArray[np.float32]) -> tuple[Floats, Floats]:
     return azimuth, inclination
 
 
-def shared_direction_pairs(xyz: NDArray[np.float32], evident: bool = True) -> Ints:
+def shared_direction_pairs(xyz: Float32s, evident: bool = True) -> Ints:
     """Pairs of points that lie in one direction from the sensor.
 
     Args:

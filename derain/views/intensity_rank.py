@@ -1,9 +1,8 @@
 """Ranks of intensities within their scan, which do not depend on the unit of intensity."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from derain.scan import Ints, Scan
+from derain.scan import Float32s, Ints, Scan
 
 # Steps in which intensities are ranked.
 INTENSITY_RANKS = 32
@@ -33,7 +32,7 @@ def intensity_rank(scan: Scan) -> Ints:
     return edges_reached(intensity, edges)
 
 
-def edges_reached(values: NDArray[np.float32], edges: NDArray[np.float32]) -> Ints:
+def edges_reached(values: Float32s, edges: Float32s) -> Ints:
     """Number of edges that are no greater than each value.
 
     Args:

@@ -10,10 +10,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.files.documents import Entry
-from derain.scan import Floats, Ints, Scan
+from derain.scan import Array, Float32s, Floats, Ints, Scan
 from derain.views.intensity_rank import INTENSITY_RANKS, edges_reached, intensity_rank
 from derain.views.merged_points import are_one_return, merged_points
 from derain.views.morton import distinct_rows
@@ -78,8 +77,8 @@ class IsolatedPoints(ViewedPoints):
     """
 
     cell: Ints
-    step: NDArray[np.float32]
-    counts: NDArray[np.float32]
+    step: Float32s
+    counts: Float32s
 
     @property
     def varying(self) -> Mapping[str, str]:
@@ -92,7 +91,7 @@ class IsolatedPoints(ViewedPoints):
         """S, the number of isolated points."""
         return len(self.neighbours)
 
-    def inputs(self) -> dict[str, NDArray[Any]]:
+    def inputs(self) -> dict[str, Array]:
         """The network's inputs, in its order."""
         names = ("points", "cell", "distances", "neighbours", "step", "counts")
         return {name: getattr(self, name) for name in names}
@@ -142,9 +141,7 @@ class IsolatedPointView(View):
         steps = np.array([step], np.float32)
         return IsolatedPoints(xyz, neighbours, distances, first, inverse, cell, steps, counts)
 
-    def _returns(
-        self, scan: Scan
-    ) -> tuple[Ints, Ints, NDArray[np.float32], NeighbourSearch, float]:
+    def _returns(self, scan: Scan) -> tuple[Ints, Ints, Float32s, NeighbourSearch, float]:
         """The distinct returns of a scan, and the step between its beams.
 
         Returns:
@@ -162,9 +159,7 @@ class IsolatedPointView(View):
             search, step, _ = self._searched(xyz, first)
         return first, inverse, xyz, search, step
 
-    def _searched(
-        self, xyz: NDArray[np.float32], first: Ints
-    ) -> tuple[NeighbourSearch, float, bool]:
+    def _searched(self, xyz: Float32s, first: Ints) -> tuple[NeighbourSearch, float, bool]:
         """The neighbour search, the step, and whether some returns are written more than once.
 
         The latter two are those of a sample: where none of thousands is written twice, the few that
@@ -177,7 +172,7 @@ class IsolatedPointView(View):
         return search, beam_step(xyz, some, neighbours), bool(doubled)
 
 
-def _cells(xyz: NDArray[np.float32], rank: Ints) -> Ints:
+def _cells(xyz: Float32s, rank: Ints) -> Ints:
     """Shell and rank of each point together, int64 (M,).
 
     Args:
@@ -190,7 +185,7 @@ def _cells(xyz: NDArray[np.float32], rank: Ints) -> Ints:
     return shell * INTENSITY_RANKS + rank
 
 
-def beam_step(xyz: NDArray[np.float32], rows: Ints, neighbours: Ints) -> float:
+def beam_step(xyz: Float32s, rows: Ints, neighbours: Ints) -> float:
     """The angle between neighbouring beams, by what lies near some points.
 
     Args:
@@ -212,14 +207,14 @@ def beam_step(xyz: NDArray[np.float32], rows: Ints, neighbours: Ints) -> float:
     return max(float(np.sqrt(np.median(chords))), FINEST_STEP)
 
 
-def _directions(xyz: NDArray[np.float32]) -> Floats:
+def _directions(xyz: Float32s) -> Floats:
     """Unit vectors to some points, float64 (3, Q)."""
     axes = np.array(xyz.T, np.float64, order="C")
     length = np.maximum(np.sqrt(np.square(axes).sum(axis=0)), NEAREST_POINT)
     return np.asarray(axes / length)
 
 
-def crowding(xyz: NDArray[np.float32], step: float) -> NDArray[np.float32]:
+def crowding(xyz: Float32s, step: float) -> Float32s:
     """How crowded each point is, together with the least crowded point near it.
 
     A point is as crowded as there are others near it, weighted less the farther they are. Rain is

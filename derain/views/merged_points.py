@@ -6,9 +6,8 @@ those at exactly one position hold none.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from derain.scan import Bools, Ints
+from derain.scan import Bools, Float32s, Ints
 
 # Two points are one return where their ranges differ by no more than this, metres, and their
 # directions by no more than this, radians. LiDARs measure ranges to 1 to 3 cm, and neighbouring
@@ -19,7 +18,7 @@ SAME_RAY = 4e-4
 
 
 def merged_points(
-    xyz: NDArray[np.float32], rows: Ints, neighbours: Ints, distances: NDArray[np.float32]
+    xyz: Float32s, rows: Ints, neighbours: Ints, distances: Float32s
 ) -> tuple[Ints, Ints]:
     """Finds which points of a scan are one return.
 
@@ -52,9 +51,7 @@ def merged_points(
     return kept, np.searchsorted(kept, keeper)
 
 
-def are_one_return(
-    xyz: NDArray[np.float32], points: Ints, neighbours: Ints, distances: NDArray[np.float32]
-) -> Bools:
+def are_one_return(xyz: Float32s, points: Ints, neighbours: Ints, distances: Float32s) -> Bools:
     """True for neighbours of some points that are one return with them.
 
     Args:

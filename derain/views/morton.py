@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.scan import Bools, Ints, Scan
+from derain.scan import Bools, Float32s, Ints, Scan
 
 BITS_PER_AXIS = 16
 
@@ -30,7 +30,7 @@ def _spread(values: NDArray[np.uint64]) -> NDArray[np.uint64]:
 _SPREAD = _spread(np.arange(2**BITS_PER_AXIS, dtype=np.uint64))
 
 
-def morton_code(xyz: NDArray[np.float32]) -> NDArray[np.uint64]:
+def morton_code(xyz: Float32s) -> NDArray[np.uint64]:
     """Number of each point's cell along a Morton (Z-order) curve through the cloud's bounding cube.
 
     Args:
@@ -53,7 +53,7 @@ def morton_code(xyz: NDArray[np.float32]) -> NDArray[np.uint64]:
     return np.asarray(_SPREAD[x] | _SPREAD[y] << np.uint64(1) | _SPREAD[z] << np.uint64(2))
 
 
-def distinct_positions(xyz: NDArray[np.float32]) -> tuple[Ints, Ints]:
+def distinct_positions(xyz: Float32s) -> tuple[Ints, Ints]:
     """Finds the positions that differ; points with exactly equal coordinates share one.
 
     Dual-return sensors write the same point twice (40 % of a raw WADS scan): such copies add
@@ -89,7 +89,7 @@ def distinct_positions(xyz: NDArray[np.float32]) -> tuple[Ints, Ints]:
     return order[new], inverse
 
 
-def _differ(xyz: NDArray[np.float32], order: Ints, places: Ints) -> Bools:
+def _differ(xyz: Float32s, order: Ints, places: Ints) -> Bools:
     """True if points at some places of an order are elsewhere than those before them, bool (Q,)."""
     own = xyz.take(order[places], axis=0)
     before = xyz.take(order[places - 1], axis=0)

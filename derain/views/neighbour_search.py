@@ -1,9 +1,8 @@
 """Exact search for the nearest neighbours of points at distinct positions."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from derain.scan import Floats, Ints
+from derain.scan import Float32s, Floats, Ints
 from derain.system.cores import sleeping_threads, threads_of
 
 with sleeping_threads():
@@ -25,15 +24,13 @@ class NeighbourSearch:
         threads: Threads of the search; 0 takes every core this process may use.
     """
 
-    def __init__(
-        self, xyz: NDArray[np.float32], rank: Ints | None = None, threads: int = 0
-    ) -> None:
+    def __init__(self, xyz: Float32s, rank: Ints | None = None, threads: int = 0) -> None:
         self._xyz = xyz.astype(np.float64)
         self._rank = np.arange(len(xyz)) if rank is None else rank
         self._threads = threads_of(threads)
         self._tree = small_gicp.KdTree(self._xyz, num_threads=self._threads) if len(xyz) else None
 
-    def __call__(self, k: int, queries: Ints | None = None) -> tuple[Ints, NDArray[np.float32]]:
+    def __call__(self, k: int, queries: Ints | None = None) -> tuple[Ints, Float32s]:
         """Finds the k nearest neighbours of some of the points.
 
         Each row starts with the point itself and ascends in distance; of equally near neighbours

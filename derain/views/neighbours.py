@@ -6,10 +6,9 @@ from functools import partial
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.files.documents import Entry
-from derain.scan import Bools, Ints, Scan
+from derain.scan import Array, Bools, Float32s, Ints, Scan
 from derain.views.candidates import Candidates
 from derain.views.channels import filled_values
 from derain.views.morton import distinct_rows
@@ -34,9 +33,9 @@ class ViewedPoints(ViewedScan):
         inverse: Point of each row of the scan, int64 (N,); -1 for rows at no point.
     """
 
-    points: NDArray[np.float32]
+    points: Float32s
     neighbours: Ints
-    distances: NDArray[np.float32]
+    distances: Float32s
     first: Ints
     inverse: Ints
 
@@ -61,7 +60,7 @@ class ViewedPoints(ViewedScan):
         return partial(_to_rows, self.inverse, self._scored, len(self.points))
 
     @staticmethod
-    def pack(seen: Sequence[ViewedScan]) -> dict[str, NDArray[Any]]:
+    def pack(seen: Sequence[ViewedScan]) -> dict[str, Array]:
         """Inputs of several scans as one cloud, each scan's neighbours staying its own."""
         inputs = [one.inputs() for one in seen]
         # What an input counts by its numbers: rows of another input, scan after scan.
@@ -123,7 +122,7 @@ class Neighbourhoods(ViewedPoints):
         """J, the number of points that the network scores."""
         return len(self.points if self.candidates is None else self.candidates)
 
-    def inputs(self) -> dict[str, NDArray[Any]]:
+    def inputs(self) -> dict[str, Array]:
         """The network's inputs, in its order: points, distances, neighbours, and any candidates."""
         return {name: getattr(self, name) for name in self.varying}
 
@@ -190,9 +189,7 @@ def neighbours_at(entry: Entry) -> int:
     return neighbours
 
 
-def _around(
-    search: NeighbourSearch, candidate: Bools, k: int
-) -> tuple[Ints, NDArray[np.float32], Ints]:
+def _around(search: NeighbourSearch, candidate: Bools, k: int) -> tuple[Ints, Float32s, Ints]:
     """Neighbourhoods of candidates, and of all points in them.
 
     Args:
@@ -220,9 +217,7 @@ def _around(
     )
 
 
-def _to_rows(
-    inverse: Ints, scored: Ints, points: int, score: NDArray[np.float32]
-) -> NDArray[np.float32]:
+def _to_rows(inverse: Ints, scored: Ints, points: int, score: Float32s) -> Float32s:
     """Gives each row of a scan the score of its point.
 
     Args:

@@ -1,10 +1,11 @@
 """From a network's logits to the probability of rain."""
 
 import numpy as np
-from numpy.typing import NDArray
+
+from derain.scan import Float32s
 
 
-def probability_of_rain(logits: NDArray[np.float32]) -> NDArray[np.float32]:
+def probability_of_rain(logits: Float32s) -> Float32s:
     """Softmax over the two classes, in a form that no logit overflows.
 
     Args:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.documents import Entry
-from derain.scan import Bools, Ints, Scan
+from derain.scan import Array, Bools, Float32s, Ints, Scan
 from derain.views.back_projection import BACK_PROJECTIONS, ProjectedPoints
 from derain.views.candidates import Candidates
 from derain.views.channels import channel_image
@@ -44,12 +44,12 @@ class RangeImage(ViewedScan):
         candidate: Rows of the scan that may be rain, bool (N,); None where all may be.
     """
 
-    image: NDArray[np.float32]
+    image: Float32s
     valid: Bools
     pixel: Ints
     winner: Ints
-    nearest: NDArray[np.float32]
-    range: NDArray[np.float32]
+    nearest: Float32s
+    range: Float32s
     wraps: bool
     back_projection_name: str
     candidate: Bools | None = None
@@ -69,7 +69,7 @@ class RangeImage(ViewedScan):
         """True for points on the grid whose pixel shows a nearer return, bool (N,)."""
         return self.judged & (self.range > self.nearest.ravel()[self.pixel])
 
-    def inputs(self) -> dict[str, NDArray[Any]]:
+    def inputs(self) -> dict[str, Array]:
         """The network's inputs, a batch of one: image (1, C, H, W) and valid (1, 1, H, W)."""
         return {"image": self.image[None], "valid": self.valid[None, None]}
 
@@ -102,7 +102,7 @@ class RangeImage(ViewedScan):
         return partial(_to_rows, self.back_projection_name, points, rows, len(self.pixel), asked)
 
     @staticmethod
-    def pack(seen: Sequence["RangeImage"]) -> dict[str, NDArray[Any]]:
+    def pack(seen: Sequence["RangeImage"]) -> dict[str, Array]:
         """Inputs of several scans on one grid as one batch."""
         return {
             "image": np.stack([one.image for one in seen]),
@@ -123,8 +123,8 @@ def _to_rows(
     rows: Ints,
     count: int,
     asked: Bools | None,
-    score: NDArray[np.float32],
-) -> NDArray[np.float32]:
+    score: Float32s,
+) -> Float32s:
     """Scores of all rows of a scan, float32 (count,): of some from pixels, of the others 0."""
     if asked is not None:
         score = np.where(asked, score, np.float32(0))
@@ -222,7 +222,7 @@ class RangeView(View):
         return pixel
 
 
-def _shown(pixel: Ints, distance: NDArray[np.float32], size: int) -> NDArray[np.void]:
+def _shown(pixel: Ints, distance: Float32s, size: int) -> NDArray[np.void]:
     """The point in each pixel: the nearest one, the lowest row of equally near ones.
 
     Args:

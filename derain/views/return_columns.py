@@ -2,12 +2,10 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from derain.scan import LARGEST_COORDINATE, Bools, Ints, Scan
+from derain.scan import LARGEST_COORDINATE, Array, Bools, Ints, Scan
 
 # Returns nearer to each other than this are of one surface, metres: the sensor split its echo.
 # Source: tier4/nebula, `dual_return_distance_threshold`.
@@ -67,7 +65,7 @@ def stated_returns(scan: Scan) -> StatedReturns | None:
     return next((stated for read in _READERS if (stated := read(scan, columns))), None)
 
 
-Columns = Mapping[str, NDArray[Any]]
+Columns = Mapping[str, Array]
 
 
 def _from_numbers(scan: Scan, columns: Columns) -> StatedReturns | None:
@@ -157,7 +155,7 @@ def _from_numbers_alone(scan: Scan, name: str, number: Ints) -> StatedReturns | 
     return StatedReturns(name, number, np.zeros(len(scan), bool), farther)
 
 
-def _whole(column: NDArray[Any]) -> Ints:
+def _whole(column: Array) -> Ints:
     """A column as whole numbers; values that are not finite or too large are -1."""
     if column.dtype.kind != "f":
         return column.astype(np.int64)

@@ -9,9 +9,8 @@ from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
-from derain.scan import Bools, Ints, Scan
+from derain.scan import Bools, Float32s, Ints, Scan
 from derain.views.directions import shared_direction_pairs
 from derain.views.morton import distinct_rows
 from derain.views.return_columns import LEAST_APART, StatedReturns, stated_returns
@@ -98,7 +97,7 @@ def _pair(scan: Scan) -> RayReturns:
     return _returns_of_rows(found, first, inverse, stated)
 
 
-def _returns_of_points(near: Ints, far: Ints, ranges: NDArray[np.float32]) -> RayReturns:
+def _returns_of_points(near: Ints, far: Ints, ranges: Float32s) -> RayReturns:
     """The return number of points, from their pairs.
 
     Args:

@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.documents import Entry, shown
-from derain.scan import Floats, Ints
+from derain.scan import Float32s, Floats, Ints
 from derain.views.direction_table import OUTSIDE, UNSURE_BELOW, DirectionTable
 from derain.views.directions import directions
 
@@ -138,7 +137,7 @@ class SphericalGrid:
         right, left = self.azimuth
         return left - right == FULL_CIRCLE
 
-    def pixel(self, xyz: NDArray[np.float32]) -> Ints:
+    def pixel(self, xyz: Float32s) -> Ints:
         """The pixel that each point falls into.
 
         On an even grid this is the published projection, except that it clamps points beyond the

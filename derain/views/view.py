@@ -4,12 +4,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Self
 
-import numpy as np
-from numpy.typing import NDArray
-
 from derain.errors import InputError
 from derain.files.documents import Entry
-from derain.scan import Bools, Ints, Scan
+from derain.scan import Array, Bools, Float32s, Ints, Scan
 from derain.system.registry import Registry
 from derain.views.candidates import Candidates
 from derain.views.spherical_grid import ALL_AROUND
@@ -19,7 +16,7 @@ from derain.views.window import Window, WindowOfScans
 IGNORED = -1
 
 # Carries scores of a view's cells, float32 (M,), to the rows of its scan, float32 (N,).
-BackProjection = Callable[[NDArray[np.float32]], NDArray[np.float32]]
+BackProjection = Callable[[Float32s], Float32s]
 
 
 class ViewedScan(ABC):
@@ -45,7 +42,7 @@ class ViewedScan(ABC):
         """True for rows of the scan that are given the score of some cell, bool (N,)."""
 
     @abstractmethod
-    def inputs(self) -> dict[str, NDArray[Any]]:
+    def inputs(self) -> dict[str, Array]:
         """The network's inputs by name, in its order."""
 
     @abstractmethod
@@ -64,7 +61,7 @@ class ViewedScan(ABC):
     def back_projection(self) -> BackProjection:
         """Back-projection of scores to the scan's rows, without the inputs, which may be freed."""
 
-    def back(self, score: NDArray[np.float32]) -> NDArray[np.float32]:
+    def back(self, score: Float32s) -> Float32s:
         """Carries the network's scores back to every row of the scan.
 
         Args:
@@ -78,7 +75,7 @@ class ViewedScan(ABC):
 
     @staticmethod
     @abstractmethod
-    def pack(seen: Sequence[Any]) -> dict[str, NDArray[Any]]:
+    def pack(seen: Sequence[Any]) -> dict[str, Array]:
         """The inputs of several scans of this kind as one batch."""
 
 

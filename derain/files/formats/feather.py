@@ -13,12 +13,11 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.files.columns import columns_of, no_place, scan_of
 from derain.files.content import Content, MemoryBudget, check_columns
 from derain.files.format import FORMATS, Format
-from derain.scan import Scan
+from derain.scan import Array, Scan
 from derain.system.extras import FLATBUFFERS, PYARROW, require
 
 # What the file begins with; what follows is a stream of messages.
@@ -48,7 +47,7 @@ class FeatherHeader:
     table: Any
     compression: str
 
-    def take(self, rows: NDArray[Any]) -> "FeatherHeader":
+    def take(self, rows: Array) -> "FeatherHeader":
         """The table of some of the points only."""
         return replace(self, table=self.table.take(np.arange(self.table.num_rows)[rows]))
 

@@ -23,7 +23,7 @@ from derain.files.content import Content
 from derain.files.format import FORMATS, Format
 from derain.files.names import scan_suffix
 from derain.files.text import encode
-from derain.scan import LARGEST_COORDINATE, Floats, Ints, Scan
+from derain.scan import LARGEST_COORDINATE, Array, Floats, Ints, Scan
 from derain.system.extras import LASPY
 
 # Sizes of the header, up to version 1.3 and from 1.4 on.
@@ -144,7 +144,7 @@ def _panics_as_errors() -> Iterator[None]:
 
 
 def _with_dimensions(
-    laspy: ModuleType, path: Path, header: Any, columns: Mapping[str, NDArray[Any]]
+    laspy: ModuleType, path: Path, header: Any, columns: Mapping[str, Array]
 ) -> Any:
     """The header with room for further columns; itself if there are none."""
     if not columns:
@@ -164,7 +164,7 @@ def _refused(path: Path) -> InputError:
     )
 
 
-def _points(laspy: ModuleType, content: Content) -> tuple[Any, NDArray[Any]]:
+def _points(laspy: ModuleType, content: Content) -> tuple[Any, Array]:
     """Laspy's header of a file, and the file's points as they are stored, structured (N,)."""
     _check_counts(content)
     with laspy.open(io.BytesIO(content.data), laz_backend=laspy.LazBackend.Lazrs) as file:

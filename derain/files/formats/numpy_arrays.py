@@ -6,17 +6,15 @@ import zipfile
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.lib import format as npy_format
-from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.columns import columns_of, intensity_name, name_columns, records, scan_of
 from derain.files.content import Content, check_columns
 from derain.files.format import FORMATS, Format
-from derain.scan import Scan, has_points_as_columns, named
+from derain.scan import Array, Scan, has_points_as_columns, named
 
 # What stands before each member in the directory of a ZIP file.
 _MEMBER = b"PK\x01\x02"
@@ -47,7 +45,7 @@ class NpzHeader:
         as_columns: Names of the columns that the file holds as arrays (N, 1).
     """
 
-    constants: Mapping[str, NDArray[Any]]
+    constants: Mapping[str, Array]
     table: str | None = None
     columns: tuple[str, ...] = ()
     structured: bool = False
@@ -123,7 +121,7 @@ class Npz(Format):
         table = _name_of_table(path, arrays)
         grid = _grid(path, arrays) if table is None else _grid_of_table(arrays[table])
         shape = _organised(path, grid)
-        fields, constants, structured = dict[str, NDArray[Any]](), {}, False
+        fields, constants, structured = dict[str, Array](), {}, False
         as_columns = set[str]()
         if table is not None:
             structured = bool(arrays[table].dtype.names)
@@ -151,7 +149,7 @@ class Npz(Format):
         """A scan's columns as named arrays, compressed. Organised clouds stay organised."""
         header = scan.header if isinstance(scan.header, NpzHeader) else NpzHeader({})
         columns = _as_in_file(scan.fields or columns_of(scan), header.as_columns)
-        arrays: dict[str, NDArray[Any]] = {}
+        arrays: dict[str, Array] = {}
         if header.table is not None and columns.keys() >= set(header.columns):
             table = {name: columns.pop(name) for name in header.columns}
             arrays[header.table] = _gridded(scan, _table(table, header.structured))
@@ -167,7 +165,7 @@ class Npz(Format):
         return file.getvalue()
 
 
-def _array(data: bytes) -> NDArray[Any]:
+def _array(data: bytes) -> Array:
     """The array of a .npy file, if the file is as long as its header states."""
     file = io.BytesIO(data)
     # The third version differs from the second in the encoding of names alone.
@@ -184,14 +182,14 @@ def _array(data: bytes) -> NDArray[Any]:
     return npy_format.read_array(file, allow_pickle=False)
 
 
-def _to_bytes(array: NDArray[Any]) -> bytes:
+def _to_bytes(array: Array) -> bytes:
     """The array as a .npy file."""
     file = io.BytesIO()
     npy_format.write_array(file, array, allow_pickle=False)
     return file.getvalue()
 
 
-def _arrays(content: Content) -> dict[str, NDArray[Any]]:
+def _arrays(content: Content) -> dict[str, Array]:
     """The arrays of an .npz file by their names."""
     check_columns(content.data.count(_MEMBER))
     arrays = {}
@@ -209,15 +207,13 @@ def _arrays(content: Content) -> dict[str, NDArray[Any]]:
     return arrays
 
 
-def _fields_as_columns(array: NDArray[Any]) -> frozenset[str]:
+def _fields_as_columns(array: Array) -> frozenset[str]:
     """Names of the fields of a structured array that have the shape (1,)."""
     names = array.dtype.names or ()
     return frozenset(name for name in names if array.dtype[name].shape == (1,))
 
 
-def _as_in_file(
-    columns: Mapping[str, NDArray[Any]], as_columns: Collection[str]
-) -> dict[str, NDArray[Any]]:
+def _as_in_file(columns: Mapping[str, Array], as_columns: Collection[str]) -> dict[str, Array]:
     """Columns of a scan, those that the file holds as (N, 1) in that shape."""
     return {
         name: column[:, np.newaxis] if name in as_columns and column.ndim == 1 else column
@@ -225,7 +221,7 @@ def _as_in_file(
     }
 
 
-def _table(columns: Mapping[str, NDArray[Any]], structured: bool) -> NDArray[Any]:
+def _table(columns: Mapping[str, Array], structured: bool) -> Array:
     """Columns as one array: numbers (N, C) if all are of one dtype, else structured (N,)."""
     dtypes = {column.dtype for column in columns.values()}
     flat = all(column.ndim == 1 for column in columns.values())
@@ -235,9 +231,7 @@ def _table(columns: Mapping[str, NDArray[Any]], structured: bool) -> NDArray[Any
     return records(columns, np.dtype(row))
 
 
-def _columns_of_table(
-    path: Path, array: NDArray[Any], columns: Sequence[str]
-) -> dict[str, NDArray[Any]]:
+def _columns_of_table(path: Path, array: Array, columns: Sequence[str]) -> dict[str, Array]:
     """The columns of an array of numbers or a structured one, (N,); fields of more axes keep them.
 
     Raises:
@@ -256,7 +250,7 @@ def _columns_of_table(
     return name_columns(path, list(array.reshape(points, array.shape[-1]).T), columns)
 
 
-def _name_of_table(path: Path, arrays: Mapping[str, NDArray[Any]]) -> str | None:
+def _name_of_table(path: Path, arrays: Mapping[str, Array]) -> str | None:
     """Name of the array that holds all columns; None where each column has its own."""
     names = {name: name for name in arrays}
     if named(names, "xyz", path) or named(names, "x", path):
@@ -264,11 +258,11 @@ def _name_of_table(path: Path, arrays: Mapping[str, NDArray[Any]]) -> str | None
     return named(names, "points", path) or (next(iter(arrays)) if len(arrays) == 1 else None)
 
 
-def _grid_of_table(array: NDArray[Any]) -> tuple[int, ...]:
+def _grid_of_table(array: Array) -> tuple[int, ...]:
     return array.shape if array.dtype.names else array.shape[:-1]
 
 
-def _grid(path: Path, arrays: Mapping[str, NDArray[Any]]) -> tuple[int, ...]:
+def _grid(path: Path, arrays: Mapping[str, Array]) -> tuple[int, ...]:
     """Shape of the arrays that hold one value per point."""
     table, column = named(arrays, "xyz", path), named(arrays, "x", path)
     if table is not None:
@@ -283,10 +277,7 @@ def _grid(path: Path, arrays: Mapping[str, NDArray[Any]]) -> tuple[int, ...]:
 
 
 def _refuse_other_points(
-    path: Path,
-    grid: tuple[int, ...],
-    fields: Mapping[str, NDArray[Any]],
-    constants: Mapping[str, NDArray[Any]],
+    path: Path, grid: tuple[int, ...], fields: Mapping[str, Array], constants: Mapping[str, Array]
 ) -> None:
     """Refuses a constant that has the name of a column that is read.
 
@@ -311,5 +302,5 @@ def _organised(path: Path, grid: tuple[int, ...]) -> tuple[int, int] | None:
     return (grid[0], grid[1]) if len(grid) == 2 else None
 
 
-def _gridded(scan: Scan, column: NDArray[Any]) -> NDArray[Any]:
+def _gridded(scan: Scan, column: Array) -> Array:
     return column.reshape(*(scan.shape or (len(scan),)), *column.shape[1:])

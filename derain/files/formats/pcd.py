@@ -14,13 +14,12 @@ from typing import Any
 
 import lzf
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.files.columns import describable_columns, records, scan_of
 from derain.files.content import LARGEST_SCAN, MOST_COLUMNS, Content, MemoryBudget, check_columns
 from derain.files.format import FORMATS, Format
 from derain.files.text import LARGEST_HEADER, decode, encode, format_rows, parse_rows
-from derain.scan import Scan
+from derain.scan import Array, Scan
 
 ENCODINGS = ("ascii", "binary", "binary_compressed")
 # TYPE and SIZE of every kind of value, in NumPy's spelling.
@@ -180,7 +179,7 @@ def _join(words: Iterable[object]) -> str:
     return " ".join(map(str, words))
 
 
-def _columns_of(header: PcdHeader, data: bytes, budget: MemoryBudget) -> dict[str, NDArray[Any]]:
+def _columns_of(header: PcdHeader, data: bytes, budget: MemoryBudget) -> dict[str, Array]:
     """The columns that the data of a file hold, without padding."""
     if header.encoding == "binary_compressed":
         return _decompressed_columns(header, data, budget)
@@ -195,9 +194,7 @@ def _columns_of(header: PcdHeader, data: bytes, budget: MemoryBudget) -> dict[st
     }
 
 
-def _decompressed_columns(
-    header: PcdHeader, data: bytes, budget: MemoryBudget
-) -> dict[str, NDArray[Any]]:
+def _decompressed_columns(header: PcdHeader, data: bytes, budget: MemoryBudget) -> dict[str, Array]:
     """One column after the other, all of them compressed as one block."""
     compressed_size, size = np.frombuffer(data, "<u4", count=2).tolist()
     named = replace(
@@ -231,7 +228,7 @@ def _check_points(header: PcdHeader, points: int, rest: int) -> None:
         raise ValueError(f"{points} points where the header states {max(stated)}")
 
 
-def _data(encoding: str, table: NDArray[Any]) -> bytes:
+def _data(encoding: str, table: Array) -> bytes:
     """The rows of a structured array (N,) as bytes of a file."""
     if encoding == "ascii":
         return format_rows(table)

@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.files.columns import describable_columns, no_place, records, scan_of
 from derain.files.content import Content, check_columns
 from derain.files.format import FORMATS, Format
 from derain.files.text import LARGEST_HEADER, decode, encode, filled_lines, format_rows, parse_rows
-from derain.scan import Scan
+from derain.scan import Array, Scan
 
 BYTE_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
 
@@ -109,10 +108,10 @@ class Faces:
     """
 
     element: Element
-    table: NDArray[Any]
+    table: Array
     points: int
 
-    def take(self, rows: NDArray[Any]) -> "Faces":
+    def take(self, rows: Array) -> "Faces":
         """The faces whose vertices all stay, renumbered.
 
         Args:
@@ -146,7 +145,7 @@ class PlyHeader:
     faces: Faces | None = None
     left_out: tuple[str, ...] = ()
 
-    def take(self, rows: NDArray[Any]) -> "PlyHeader":
+    def take(self, rows: Array) -> "PlyHeader":
         """The header of a file of some of the vertices only."""
         return self if self.faces is None else replace(self, faces=self.faces.take(rows))
 
@@ -204,7 +203,7 @@ class Ply(Format):
         return content
 
 
-def _parse(content: bytes) -> tuple[PlyHeader, NDArray[Any]]:
+def _parse(content: bytes) -> tuple[PlyHeader, Array]:
     """The content of a file besides its vertices, and the vertices, structured (N,)."""
     encoding, comments, elements, data = _parse_header(content)
     names = [element.name for element in elements]
@@ -260,9 +259,7 @@ def _parse_header(content: bytes) -> tuple[str, tuple[str, ...], list[Element], 
     return encoding, tuple(comments), elements, content[end.end() :]
 
 
-def _read_rows(
-    data: bytes, encoding: str, row: np.dtype[Any], start: int, count: int
-) -> NDArray[Any]:
+def _read_rows(data: bytes, encoding: str, row: np.dtype[Any], start: int, count: int) -> Array:
     """Reads rows of an element.
 
     Args:

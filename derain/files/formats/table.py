@@ -12,17 +12,16 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import chain, islice
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.files.columns import columns_of, name_columns, no_place, scan_of
 from derain.files.content import Content, check_columns
 from derain.files.format import FORMATS, Format
 from derain.files.names import scan_suffix
 from derain.files.text import decode, encode
-from derain.scan import Ints, Scan
+from derain.scan import Array, Ints, Scan
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
@@ -60,14 +59,14 @@ class TableHeader:
     text: bytes
     begin: int
     spans: Ints
-    columns: Mapping[str, NDArray[Any]]
+    columns: Mapping[str, Array]
 
-    def take(self, rows: NDArray[Any]) -> "TableHeader":
+    def take(self, rows: Array) -> "TableHeader":
         """The table of some of the points only."""
         columns = {name: column[rows] for name, column in self.columns.items()}
         return replace(self, spans=self.spans[rows], columns=columns)
 
-    def holds(self, columns: Mapping[str, NDArray[Any]]) -> bool:
+    def holds(self, columns: Mapping[str, Array]) -> bool:
         """True if the lines hold just these columns, with these numbers."""
         return tuple(columns) == tuple(self.columns) and all(
             np.array_equal(ours, theirs, equal_nan=True)
@@ -159,7 +158,7 @@ class Text(Table):
     RECORD = 2
 
 
-def _refuse_unreadable(path: Path, name: str, column: NDArray[Any], separator: str | None) -> None:
+def _refuse_unreadable(path: Path, name: str, column: Array, separator: str | None) -> None:
     """Refuses a column that could not be read again as it was."""
     one_line = name == name.strip() and len(name.splitlines()) < 2
     one_word = separator is not None or not set(name) & set(",; \t\"'")
@@ -214,7 +213,7 @@ def _filled_lines(text: bytes) -> Iterator[Line]:
 
 def _parse_lines(
     lines: Iterator[Line], separator: str | None, titles: Sequence[str]
-) -> tuple[list[NDArray[Any]], Ints]:
+) -> tuple[list[Array], Ints]:
     """The columns of lines, and their spans as in TableHeader.
 
     Args:
@@ -226,7 +225,7 @@ def _parse_lines(
         ValueError: Lines of different lengths, or values that are not numbers.
         csv.Error: Quotes that do not match.
     """
-    columns: list[list[NDArray[Any]]] = [[] for _ in titles]
+    columns: list[list[Array]] = [[] for _ in titles]
     spans = [np.empty((0, 2), np.int64)]
     while chunk := list(islice(lines, _CHUNK)):
         rows = list(_rows((line.text for line in chunk), separator))
@@ -248,7 +247,7 @@ def _parse_lines(
     return [_joined(column) for column in columns], np.concatenate(spans)
 
 
-def _numbers(texts: Sequence[str]) -> NDArray[Any]:
+def _numbers(texts: Sequence[str]) -> Array:
     """The numbers of some texts: int64, or uint64 if only that holds them, or else float64.
 
     Raises:
@@ -260,7 +259,7 @@ def _numbers(texts: Sequence[str]) -> NDArray[Any]:
     return np.fromiter(map(_number, texts), np.float64, len(texts))
 
 
-def _joined(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
+def _joined(parts: Sequence[Array]) -> Array:
     """The parts of a column as one, of a type as for `_numbers`."""
     if not parts:
         return np.empty(0)

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
-from derain.scan import Floats, Ints
+from derain.scan import Float32s, Floats, Ints
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import Span, log_uniform, log_uniforms
@@ -35,9 +34,9 @@ class Relief:
         phases: Float32 (W,), radians.
     """
 
-    waves: NDArray[np.float32]
-    amplitudes: NDArray[np.float32]
-    phases: NDArray[np.float32]
+    waves: Float32s
+    amplitudes: Float32s
+    phases: Float32s
 
     @classmethod
     def draw(cls, height: float, generator: Generator) -> "Relief":
