@@ -138,9 +138,8 @@ def _radar_frames(folder: Path | None, columns: Sequence[str], source: Source) -
         return {}
     frames = {frame.key: frame for frame in named_frames([folder], columns, layouts=())}
     for key in frames.keys() - {frame.key for frame in source}:
-        raise InputError(
-            frames[key].name, "no scan has its name", "Pair the frames in time with `derain fuse`."
-        )
+        reason = "no scan has its name"
+        raise InputError(frames[key].name, reason, "Pair the frames in time with `derain fuse`.")
     return frames
 
 

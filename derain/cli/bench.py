@@ -139,9 +139,8 @@ def main(arguments: argparse.Namespace) -> int:
             print_lines(str(found))
         return 0
     if not data.has_parts:
-        raise InputError(
-            arguments.data[0], "has no split, which the paper's tables need", "Name the root."
-        )
+        reason = "has no split, which the paper's tables need"
+        raise InputError(arguments.data[0], reason, "Name the root.")
     table = paper_table(arguments.paper)
     groups = scans_by_group(table, partial(_frames, data), lambda frame: rates.get(frame.sequence))
     benches = {group: bench(frames, arguments.out / group) for group, frames in groups.items()}

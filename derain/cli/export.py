@@ -99,9 +99,8 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.inside is not None and not arguments.candidates:
         raise InputError("--inside", "bounds candidates, and there are none", "Give --candidates.")
     if arguments.int8 != bool(arguments.calibration):
-        raise InputError(
-            "--int8", "needs --calibration, and that needs it", "Give both or neither."
-        )
+        reason = "needs --calibration, and that needs it"
+        raise InputError("--int8", reason, "Give both or neither.")
     runtime = runtime_of(arguments)
     is_default = arguments.checkpoint == DEFAULT
     model = load_model(default_checkpoint() if is_default else arguments.checkpoint)

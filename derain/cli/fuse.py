@@ -109,11 +109,9 @@ def main(arguments: argparse.Namespace) -> int:
     times = _times(lidar, arguments.metadata_columns)
     nearest = nearest_in_time(times, _times(radar, arguments.metadata_columns), arguments.within)
     if (nearest < 0).all():
-        raise InputError(
-            arguments.radar,
-            f"no frame is within {arguments.within:g} s of a LiDAR scan",
-            "Check that the timestamps are seconds of one clock, or widen --within.",
-        )
+        reason = f"no frame is within {arguments.within:g} s of a LiDAR scan"
+        remedy = "Check that the timestamps are seconds of one clock, or widen --within."
+        raise InputError(arguments.radar, reason, remedy)
     partners = [radar[number] if number >= 0 else None for number in nearest.tolist()]
     extra = [name for name in arguments.extra.split(",") if name]
     suffix = ".npz" if extra else ".bin"

@@ -59,9 +59,8 @@ def main(arguments: argparse.Namespace) -> int:
     stats = load_card(arguments.stats)
     data = stats if arguments.data is None else load_card(arguments.data)
     if not data.rain:
-        raise InputError(
-            "--data", f"{data.name} has no rain", "Give the card of the weights' training data."
-        )
+        reason = f"{data.name} has no rain"
+        raise InputError("--data", reason, "Give the card of the weights' training data.")
     weights = read_state_dict(arguments.weights)
     try:
         model = published[name].from_published(weights, data.normalised_as(stats), arguments.grid)

@@ -154,11 +154,9 @@ def _describe(name: str, arguments: argparse.Namespace) -> None:
 def _describe_default(as_json: bool) -> None:
     """Prints the card of the model that comes with derain, once its file is known to be it."""
     if os.path.exists(DEFAULT):
-        raise InputError(
-            DEFAULT,
-            "it names the model that comes with derain, and also a file or folder here",
-            f"Write ./{DEFAULT} for the file or folder, or run the command in another folder.",
-        )
+        reason = "it names the model that comes with derain, and also a file or folder here"
+        remedy = f"Write ./{DEFAULT} for the file or folder, or run the command in another folder."
+        raise InputError(DEFAULT, reason, remedy)
     model, card = default_model(), model_card()
     if as_json:
         print(json.dumps({"file": str(model), **card.as_dict()}))

@@ -62,11 +62,8 @@ def facts_of_file(path: Path, card_name: str | None, columns: Sequence[str]) -> 
             weights = sum(parameter.numel() for parameter in model.parameters())
             return {"spec": dict(model.hparams["spec"]), "parameters": weights}
         case ".pt" | ".pth":
-            raise InputError(
-                path,
-                "holds weights without the Spec of their use",
-                "Make a checkpoint of them with `derain import-weights`.",
-            )
+            remedy = "Make a checkpoint of them with `derain import-weights`."
+            raise InputError(path, "holds weights without the Spec of their use", remedy)
         case _:
             card = None if card_name is None else load_card(card_name)
             frame = frame_of(path, columns, layouts_for(card))

@@ -185,9 +185,8 @@ def _layout(folder: Path, card: DataCard | None, stated: str | None) -> Layout |
         return find_layout(folder, layouts_for(card))
     folders = stated.split(",")
     if len(folders) != 2:
-        raise InputError(
-            "--layout", f"'{stated}' does not name two folders", "Give e.g. velodyne,labels."
-        )
+        reason = f"'{stated}' does not name two folders"
+        raise InputError("--layout", reason, "Give e.g. velodyne,labels.")
     scans, labels = folders
     return replace(card.layout if card else Layout(), scans=scans, labels=labels)
 

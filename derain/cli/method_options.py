@@ -107,9 +107,8 @@ def method_of(method: str, arguments: argparse.Namespace) -> Method:
         of_method, tuned = read_parameters(file)
         # Models are files, which have more than one name.
         if Path(of_method).resolve() != Path(name).resolve():
-            raise InputError(
-                file, f"holds parameters of {of_method}, not of {name}", f"Run {of_method} with it."
-            )
+            reason = f"holds parameters of {of_method}, not of {name}"
+            raise InputError(file, reason, f"Run {of_method} with it.")
         parameters |= tuned
     return load_method(name, parameters | dict(arguments.set), arguments.threads, runtime)
 
@@ -180,11 +179,8 @@ def method_and_scans(
     of_method = path.suffix in METHOD_SUFFIXES and not folder
     named = of_method or (not path.suffix and is_method_name(first))
     if not (named or there):
-        raise InputError(
-            first,
-            "no such method, file or folder",
-            f"{method_hint(first)}, and scans after it; or scans alone.",
-        )
+        remedy = f"{method_hint(first)}, and scans after it; or scans alone."
+        raise InputError(first, "no such method, file or folder", remedy)
     # Formats come last: to look a suffix up may import what other packages bring.
     if not named and (not others or folder or in_bag or scan_suffix(path) in FORMATS):
         return DEFAULT, [path, *others]

@@ -111,9 +111,8 @@ def division_of(arguments: argparse.Namespace) -> Division:
     """
     of_shard = shard_of(arguments)
     if arguments.anew and of_shard is not None:
-        raise InputError(
-            "--anew", "excludes shards of the work", "Give --out another folder instead."
-        )
+        reason = "excludes shards of the work"
+        raise InputError("--anew", reason, "Give --out another folder instead.")
     keep = arguments.resume or arguments.workers is not None or arguments.dask is not None
     return Division(arguments.block, of_shard, keep, arguments.anew)
 

@@ -111,19 +111,15 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     if arguments.rerun is not None:
         if arguments.out or arguments.window:
-            raise InputError(
-                "--rerun", "cannot be combined with --out or --window", "Leave them out."
-            )
+            reason = "cannot be combined with --out or --window"
+            raise InputError("--rerun", reason, "Leave them out.")
         return _view_recording(arguments)
     path = arguments.scans[0]
     if or_example(path) != path:
         path = example_file()
     if len(arguments.scans) > 1 or (path.is_dir() and not is_bag(path)):
-        raise InputError(
-            path,
-            "is more than one scan; a picture shows one",
-            "Name one, or give --rerun out.rrd to see all of them.",
-        )
+        reason = "is more than one scan; a picture shows one"
+        raise InputError(path, reason, "Name one, or give --rerun out.rrd to see all of them.")
     if not (arguments.out or arguments.window):
         raise InputError(path, "no output is named", "Give --out, --window or --rerun.")
     require("view", MATPLOTLIB, *((OPEN3D,) if arguments.window else ()))

@@ -132,7 +132,6 @@ def _scans_in(folder: Path) -> list[Path]:
     least = min((FORMATS[scan_suffix(path)].RECORD for path in scans), default=0)
     scans = [path for path in scans if least == FORMATS[scan_suffix(path)].RECORD]
     if not scans:
-        raise InputError(
-            folder, f"holds no scans ({', '.join(FORMATS)})", "Name a folder with scans in it."
-        )
+        reason = f"holds no scans ({', '.join(FORMATS)})"
+        raise InputError(folder, reason, "Name a folder with scans in it.")
     return scans

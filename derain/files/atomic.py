@@ -80,11 +80,8 @@ def writing(path: Path) -> Iterator[None]:
     except BrokenPipeError:  # the pipe is one that the block prints to, never the file
         raise
     except OSError as error:
-        raise InputError(
-            path,
-            f"cannot be written ({error.strerror or error})",
-            "Choose a folder that is writable and has room.",
-        ) from error
+        reason = f"cannot be written ({error.strerror or error})"
+        raise InputError(path, reason, "Choose a folder that is writable and has room.") from error
 
 
 def require_writable(path: Path) -> None:

@@ -35,11 +35,9 @@ def name_columns(path: Path, columns: Sequence[Array], names: Sequence[str]) -> 
     """
     stated = ",".join(names)
     if len(columns) != len(names):
-        raise InputError(
-            path,
-            f"has {len(columns)} columns, but {len(names)} are stated ({stated})",
-            "Name every column of the file with --columns, x, y and z among them.",
-        )
+        reason = f"has {len(columns)} columns, but {len(names)} are stated ({stated})"
+        remedy = "Name every column of the file with --columns, x, y and z among them."
+        raise InputError(path, reason, remedy)
     if len(set(names)) < len(names):
         raise InputError("--columns", f"a name comes twice in {stated}", "Name each column once.")
     return dict(zip(names, columns, strict=True))
@@ -131,11 +129,9 @@ def _refuse_unusable(path: Path, fields: Mapping[str, Array]) -> None:
         if column is not None and named(usable, name, path) is None
     ]
     if unusable:
-        raise InputError(
-            path,
-            f"its coordinates are not one number per point: {', '.join(unusable)}",
-            "Give x, y and z as whole or real numbers, one of each per point.",
-        )
+        reason = f"its coordinates are not one number per point: {', '.join(unusable)}"
+        remedy = "Give x, y and z as whole or real numbers, one of each per point."
+        raise InputError(path, reason, remedy)
 
 
 def _kind(column: Array) -> str:

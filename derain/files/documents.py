@@ -155,9 +155,8 @@ class Entry:
             raise self.fault(f"{shown(self.value)} is not a mapping", "Write `key: value` pairs.")
         for key in self.value:
             if not isinstance(key, str):
-                raise self.fault(
-                    f"the key {shown(key)} is no text", "Quote it: 010 alone is a number."
-                )
+                reason = f"the key {shown(key)} is no text"
+                raise self.fault(reason, "Quote it: 010 alone is a number.")
         return {
             key: Entry(self.source, f"{self.key}.{key}" if self.key else key, value)
             for key, value in self.value.items()
@@ -242,18 +241,15 @@ class Entry:
         """A number from ``least`` to ``most``."""
         number = self.number()
         if not least <= number <= most:
-            raise self.fault(
-                f"{number:g} is not within {least:g} and {most:g}", "Write one that is."
-            )
+            reason = f"{number:g} is not within {least:g} and {most:g}"
+            raise self.fault(reason, "Write one that is.")
         return number
 
     def whole(self, least: int, most: int) -> int:
         """A whole number from ``least`` to ``most``."""
         if type(self.value) is not int or not least <= self.value <= most:
-            raise self.fault(
-                f"{shown(self.value)} is not a whole number from {least:,} to {most:,}",
-                "Write one that is.",
-            )
+            reason = f"{shown(self.value)} is not a whole number from {least:,} to {most:,}"
+            raise self.fault(reason, "Write one that is.")
         return self.value
 
     def truth(self) -> bool:
@@ -275,9 +271,8 @@ class Entry:
         for choice in choices:
             if choice == self.value:
                 return choice
-        raise self.fault(
-            f"{shown(self.value)} is not known", f"Available: {', '.join(map(str, choices))}."
-        )
+        reason = f"{shown(self.value)} is not known"
+        raise self.fault(reason, f"Available: {', '.join(map(str, choices))}.")
 
     def texts(self) -> tuple[str, ...]:
         """A list of texts."""

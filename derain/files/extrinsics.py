@@ -79,10 +79,8 @@ def read_extrinsics(path: Path) -> Extrinsics:
     if values.keys() == set(POSE):
         return Extrinsics.of_pose(**{name: value.number() for name, value in values.items()})
     if values.keys() != {"matrix"}:
-        raise document.fault(
-            f"its keys are {', '.join(values)}",
-            f"It needs {', '.join(POSE)} (metres, degrees), or matrix (4 rows of 4 numbers).",
-        )
+        remedy = f"It needs {', '.join(POSE)} (metres, degrees), or matrix (4 rows of 4 numbers)."
+        raise document.fault(f"its keys are {', '.join(values)}", remedy)
     matrix = values["matrix"]
     rows = np.array([row.numbers(4) for row in matrix.items()], np.float64)
     try:

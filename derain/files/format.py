@@ -98,9 +98,6 @@ def format_of(path: Path) -> Format:
     """
     suffix = scan_suffix(path)
     if suffix not in FORMATS:
-        raise InputError(
-            path,
-            f"'{suffix}' is not the suffix of a scan",
-            f"Available: {', '.join(FORMATS)}, and each of them with .gz.",
-        )
+        remedy = f"Available: {', '.join(FORMATS)}, and each of them with .gz."
+        raise InputError(path, f"'{suffix}' is not the suffix of a scan", remedy)
     return FORMATS[suffix]()

@@ -65,11 +65,9 @@ def _lines(path: Path, columns: Sequence[str]) -> Iterator[list[str]]:
         lines = csv.DictReader(io.StringIO(text, newline=""), restval="", skipinitialspace=True)
         present = lines.fieldnames or ()
         if not set(columns) <= set(present):
-            raise InputError(
-                path,
-                f"has no columns {' and '.join(columns)} ({', '.join(present)})",
-                "Name those of the scan's name and its time with --metadata-columns.",
-            )
+            reason = f"has no columns {' and '.join(columns)} ({', '.join(present)})"
+            remedy = "Name those of the scan's name and its time with --metadata-columns."
+            raise InputError(path, reason, remedy)
         for line in lines:
             yield [line[name] for name in columns]
 

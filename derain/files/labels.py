@@ -76,11 +76,8 @@ def write_labels(path: Path, semantic: Array, instance: Array | None = None) -> 
         instance = np.zeros_like(semantic)
     for ids in (semantic, instance):
         if ((ids < 0) | (ids > LARGEST_ID)).any():
-            raise InputError(
-                path,
-                f"a label lies outside 0 to {LARGEST_ID}",
-                "A label file has 16 bits for each id.",
-            )
+            reason = f"a label lies outside 0 to {LARGEST_ID}"
+            raise InputError(path, reason, "A label file has 16 bits for each id.")
     raw = semantic.astype("<u4") | instance.astype("<u4") << np.uint32(16)
     with replacing(path) as temporary:
         temporary.write_bytes(raw.data)  # not tofile, which hides why it fails

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from derain.errors import InputError
+from derain.errors import InputError, reason_of
 from derain.files.names import scan_suffix
 
 
@@ -26,26 +26,19 @@ def reading(path: Path, *damage: type[Exception]) -> Iterator[None]:
     except (InputError, BrokenPipeError):  # the pipe that the block prints to, not the file
         raise
     except damage as error:
-        reason = " ".join(str(error).split())
-        raise InputError(
-            path,
-            f"cannot be read as {scan_suffix(path)} ({reason})",
-            "The file is damaged or of another format; write it again.",
-        ) from error
+        reason = f"cannot be read as {scan_suffix(path)} ({reason_of(error)})"
+        remedy = "The file is damaged or of another format; write it again."
+        raise InputError(path, reason, remedy) from error
     except FileNotFoundError as error:
         raise InputError(path, "there is no such file", "Check the path.") from error
     except IsADirectoryError as error:
         raise InputError(path, "is a folder", "Name a file.") from error
     except OSError as error:
-        raise InputError(
-            path,
-            f"cannot be read ({error.strerror or error})",
-            "Check the file and its permissions.",
-        ) from error
+        reason = f"cannot be read ({error.strerror or error})"
+        raise InputError(path, reason, "Check the file and its permissions.") from error
     except MemoryError as error:
-        raise InputError(
-            path, "needs more memory than is available", "Cut it into smaller scans."
-        ) from error
+        reason = "needs more memory than is available"
+        raise InputError(path, reason, "Cut it into smaller scans.") from error
 
 
 def read_bytes(path: Path, largest: int) -> bytes:

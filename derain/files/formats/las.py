@@ -159,9 +159,8 @@ def _with_dimensions(
 
 
 def _refused(path: Path) -> InputError:
-    return InputError(
-        path, f"only a scan read from a {scan_suffix(path)} can be written as one", "Write .npz."
-    )
+    reason = f"only a scan read from a {scan_suffix(path)} can be written as one"
+    return InputError(path, reason, "Write .npz.")
 
 
 def _points(laspy: ModuleType, content: Content) -> tuple[Any, Array]:

@@ -269,11 +269,8 @@ def _grid(path: Path, arrays: Mapping[str, Array]) -> tuple[int, ...]:
         return table.shape[:-1]
     if column is not None:
         return column.shape[:1] if column.shape[1:] == (1,) else column.shape
-    raise InputError(
-        path,
-        f"has no coordinates among its arrays ({', '.join(arrays)})",
-        "Name them xyz, or x, y and z.",
-    )
+    reason = f"has no coordinates among its arrays ({', '.join(arrays)})"
+    raise InputError(path, reason, "Name them xyz, or x, y and z.")
 
 
 def _refuse_other_points(
