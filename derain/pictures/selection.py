@@ -5,7 +5,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,7 +141,7 @@ class SensorLook:
     view: RangeView | None
 
     @classmethod
-    def of(cls, frames: Sequence[Frame]) -> Self:
+    def of(cls, frames: Sequence[Frame]) -> "SensorLook":
         """Takes the look from some scans of a recording.
 
         Args:

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import repeat
-from typing import Self
 
 import numpy as np
 from numpy.random import Generator
@@ -46,7 +45,7 @@ class SimulatedScene:
     skew: bool = False
 
     @classmethod
-    def of(cls, campaign: Campaign, name: str, generator: Generator) -> Self:
+    def of(cls, campaign: Campaign, name: str, generator: Generator) -> "SimulatedScene":
         """Draws the scene of a sequence.
 
         Raises:

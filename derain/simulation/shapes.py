@@ -1,13 +1,11 @@
 """Shapes of triangles: float64 arrays of shape (T, 3, 3), T triangles of 3 corners in metres."""
 
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
-from derain.scan import Floats
+from derain.scan import Array, Floats
 
 Triangles = Floats
 
@@ -186,7 +184,7 @@ def across(along: Floats) -> tuple[Floats, Floats]:
     return first.T, second.T
 
 
-def nearest_to_axis(triangles: NDArray[np.floating[Any]]) -> Floats:
+def nearest_to_axis(triangles: Array) -> Floats:
     """The x and y, (2, T), where each triangle, seen from above, is nearest to the z axis.
 
     That is a corner or a place on an edge; that the axis goes through a triangle does not count.

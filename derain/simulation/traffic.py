@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 from numpy.random import Generator
@@ -52,7 +51,7 @@ class Course:
     mounting: Floats
 
     @classmethod
-    def draw(cls, speed: float, generator: Generator) -> Self:
+    def draw(cls, speed: float, generator: Generator) -> "Course":
         """Draws a course at a speed in m/s."""
         sway = min(1.0, speed / SPEED_OF_FULL_SWAY)
         shape = (len(POSE), WAVES)

@@ -149,14 +149,11 @@ class _Window:
 
         On a full circle its sides continue at the other end; all else of the margin has one value.
         """
-        height, width = image.shape
-        padded = np.full((height + 2 * REACH, width + 2 * REACH), value, image.dtype)
-        rows = padded[REACH:-REACH]
-        rows[:, REACH:-REACH] = image
+        above_and_below, aside = ((REACH, REACH), (0, 0)), ((0, 0), (REACH, REACH))
+        tall = np.pad(image, above_and_below, constant_values=value)
         if self._wraps:
-            rows[:, :REACH] = image.take(range(-REACH, 0), axis=1, mode="wrap")
-            rows[:, -REACH:] = image.take(range(width, width + REACH), axis=1, mode="wrap")
-        return padded.ravel()
+            return np.pad(tall, aside, mode="wrap").ravel()
+        return np.pad(tall, aside, constant_values=value).ravel()
 
     def closest_in_range(self, pixel: Ints, distance: Float32s) -> Ints:
         """The pixel around each pixel that shows the range most like a point's, int64 (N,)."""

@@ -49,10 +49,7 @@ def channel_values(scan: Scan, rows: Ints, channels: Sequence[str]) -> Float32s:
     Returns:
         float32 (C, M), each channel in its own unit; NaN for values that the scan lacks.
     """
-    values = np.empty((len(channels), len(rows)), np.float32)
-    for of_channel, name in zip(values, channels, strict=True):
-        of_channel[:] = _column(scan, name)[rows]
-    return values
+    return np.stack([_column(scan, name)[rows] for name in channels])
 
 
 def filled_values(

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 
@@ -52,7 +51,7 @@ class ReturnAngles:
     row: Ints | None
 
     @classmethod
-    def of(cls, scan: Scan) -> Self:
+    def of(cls, scan: Scan) -> "ReturnAngles":
         """The angles of a scan's valid points."""
         valid = np.flatnonzero(scan.valid)
         azimuth, inclination = directions(scan.xyz.take(valid, axis=0))

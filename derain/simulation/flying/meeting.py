@@ -1,7 +1,6 @@
 """Beams among flying particles: the particles that they meet, and the sensor's reports."""
 
 from dataclasses import dataclass, replace
-from typing import Self
 
 import numpy as np
 from numpy.random import Generator
@@ -35,7 +34,7 @@ class Encounters(Columns):
     covered: Floats
     brightness: Floats
 
-    def ordered(self) -> Self:
+    def ordered(self) -> "Encounters":
         """The same by beam, and then by distance."""
         return self.take(np.lexsort((self.range, self.beam)))
 

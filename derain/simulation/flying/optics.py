@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 from numpy.random import Generator
@@ -29,7 +28,7 @@ class Sizes:
     share: Floats
 
     @classmethod
-    def gamma(cls, mean: float, shape: float, largest: float) -> Self:
+    def gamma(cls, mean: float, shape: float, largest: float) -> "Sizes":
         """Gamma-distributed diameters, cut at SMALLEST and at the largest.
 
         Args:
@@ -88,7 +87,7 @@ class Optics:
     farthest: float
 
     @classmethod
-    def of(cls, precipitation: Precipitation, sensor: Sensor) -> Self:
+    def of(cls, precipitation: Precipitation, sensor: Sensor) -> "Optics":
         """The optics of a sensor in some precipitation.
 
         Where that states a reach, the gain is such that a particle of its mean diameter is at the
