@@ -22,13 +22,8 @@ from derain.evaluation.answers import (
     total,
 )
 from derain.evaluation.counts import ratio
+from derain.pictures import scan_pictures
 from derain.pictures.palette import OUTCOMES
-from derain.pictures.scan_pictures import (
-    draw_from_above,
-    explain_colours,
-    legend_below,
-    titled_figure,
-)
 from derain.scan import Bools, Ints, Scan
 
 # Distinct to colour-blind eyes and in grey.
@@ -58,7 +53,7 @@ def teacher_figure(scans: Sequence[AnswersOfScan], title: str) -> Figure:
         scans: The scans, in time order, one or more.
         title: Heading.
     """
-    figure = titled_figure(12, 4.6, title)
+    figure = scan_pictures.titled_figure(12, 4.6, title)
     by_scan, by_range = figure.subplots(1, 2, width_ratios=(3, 2))
     _draw_by_scan(by_scan, scans)
     bands = coarse_bands(total([scan.answers for scan in scans]))
@@ -66,8 +61,8 @@ def teacher_figure(scans: Sequence[AnswersOfScan], title: str) -> Figure:
     _draw_shares(by_range, np.arange(len(filled)), list(filled.values()), width=0.8)
     by_range.set_xticks(range(len(filled)), list(filled))
     by_range.set_title("by range, all scans", fontsize=10)
-    ncols = len(TEACHERS_ANSWERS)
-    legend_below(figure, by_range.containers, ncols=ncols, title="the rest: not rain")
+    legend = {"ncols": len(TEACHERS_ANSWERS), "title": "the rest: not rain"}
+    scan_pictures.legend_below(figure, by_range.containers, **legend)
     return figure
 
 
@@ -129,17 +124,18 @@ def answers_figure(scan: Scan, card: DataCard, called_rain: Bools, title: str) -
         "not known to the teacher, or rain to it alone": LEFT,
         "rain to the student alone": LOST,
     }
-    figure = titled_figure(16, 5.7, title)
+    figure = scan_pictures.titled_figure(16, 5.7, title)
     row = figure.subplots(1, 3, sharex=True, sharey=True)
     for axes, (name, outcome) in zip(row, panels.items(), strict=True):
         axes.set_title(name)
-        draw_from_above(axes, scan, outcome)
+        scan_pictures.draw_from_above(axes, scan, outcome)
         axes.set_xlabel("right / m")
     half = _reach(scan, called_rain | (answer == RAIN))
     row[0].set(xlim=(-1.2 * half, 1.2 * half), ylim=(-half, half))
     row[0].set_ylabel("forward / m")
     colours = list(OUTCOMES.values())
-    explain_colours(figure, {name: colours[number] for name, number in meanings.items()})
+    explained = {name: colours[number] for name, number in meanings.items()}
+    scan_pictures.explain_colours(figure, explained)
     return figure
 
 
@@ -171,15 +167,9 @@ def _draw_shares(axes: Axes, places: Ints, answers: Sequence[Answers], width: fl
     shares = np.nan_to_num(shares)  # no bar where there are no points
     bottom = np.zeros(len(answers))
     for answer in (RAIN, NOT_KNOWN):
-        axes.bar(
-            places,
-            shares[:, answer],
-            width,
-            bottom,
-            color=OF_ANSWERS[answer],
-            label=TEACHERS_ANSWERS[answer],
-        )
-        bottom = bottom + shares[:, answer]
+        share, colour, name = shares[:, answer], OF_ANSWERS[answer], TEACHERS_ANSWERS[answer]
+        axes.bar(places, share, width, bottom, color=colour, label=name)
+        bottom = bottom + share
     _scale(axes, float(bottom.max(initial=0)))
 
 

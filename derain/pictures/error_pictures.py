@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
@@ -14,8 +14,8 @@ from derain.evaluation.text_tables import number_text
 from derain.pictures.palette import LOST, MISSED
 from derain.pictures.scan_pictures import legend_below, titled_figure
 
-# Shares with the darkest and the lightest colour: errors span decades.
-DARKEST, LIGHTEST = 1.0, 1e-4
+# Depth of the colour of a share, lightest and darkest at these two: errors span decades.
+DEPTH = LogNorm(1e-4, 1.0, clip=True)
 
 # Colours of cells, as in the pictures of scans: rain that is kept, and others that are removed.
 LEFT = LinearSegmentedColormap.from_list("left", ["#fffdf3", MISSED])
@@ -91,8 +91,7 @@ def _rows(counts: Mapping[str, Sequence[ClassCounts]]) -> dict[str, list[ClassCo
 def _colour(cell: ClassCounts) -> tuple[float, ...]:
     if not cell.wrong:
         return (1.0, 1.0, 1.0, 1.0)
-    depth = np.log(cell.share_wrong / LIGHTEST) / np.log(DARKEST / LIGHTEST)
-    return (LEFT if cell.rain else LOST_SHADES)(float(np.clip(depth, 0, 1)))
+    return (LEFT if cell.rain else LOST_SHADES)(DEPTH(cell.share_wrong))
 
 
 def _text(cell: ClassCounts) -> str:
@@ -109,19 +108,12 @@ def _draw_curve(axes: Axes, points: OperatingPoints, chosen: int, best: int) -> 
         axes.text(1.005, iou, f" IoU {iou:g}", color=FAINT_TEXT, fontsize=8, va="center")
     axes.plot(points.recall, points.precision, color=RECALL, linewidth=1.8, zorder=2)
     for number, name, face in ((best, "most IoU", "white"), (chosen, "chosen", IOU)):
-        counts, threshold = points.counts(number), points.thresholds[number]
-        axes.plot(
-            counts.recall,
-            counts.precision,
-            marker="o",
-            color=IOU,
-            markerfacecolor=face,
-            markersize=8,
-            linestyle="none",
-            zorder=3,
-            label=f"{name}: threshold {threshold:.4g}\nprecision {number_text(counts.precision)}, "
-            f"recall {counts.recall:.3f}, IoU {counts.iou:.3f}",
-        )
+        counts = points.counts(number)
+        precision = number_text(counts.precision)
+        scores = f"precision {precision}, recall {counts.recall:.3f}, IoU {counts.iou:.3f}"
+        label = f"{name}: threshold {points.thresholds[number]:.4g}\n{scores}"
+        (marker,) = axes.plot(counts.recall, counts.precision, "o", color=IOU, label=label)
+        marker.set(markerfacecolor=face, markersize=8, zorder=3)
     axes.set(xlim=(0, 1), ylim=(0, 1.02), xlabel="recall", ylabel="precision")
     axes.set_title(f"average precision {points.average_precision:.3f}", fontsize=10)
     axes.legend(loc="lower left", fontsize=8.5)

@@ -13,12 +13,7 @@ MISSED = "#ffd23f"
 LOST = "#ff5d5d"
 
 # Colours by the class of a point and its outcome; outcomes are numbers in this order.
-OUTCOMES = {
-    "solid, kept": SOLID,
-    "rain, removed": RAIN,
-    "rain, left": MISSED,
-    "solid, lost": LOST,
-}
+OUTCOMES = {"solid, kept": SOLID, "rain, removed": RAIN, "rain, left": MISSED, "solid, lost": LOST}
 
 # The same where the rain is not known.
 WITHOUT_LABELS = {"kept": SOLID, "removed": RAIN}

@@ -148,14 +148,13 @@ def _check_messages(arrow: ModuleType, stream: bytes, budget: MemoryBudget) -> s
             continue
         root = Table(memoryview(message.metadata), 0)
         batch = _member(Table(root.Bytes, root.Indirect(0)), _MESSAGE_HEADER)
-        if batch is not None and message.type == "dictionary":
+        if message.type == "dictionary":
             batch = _member(batch, _DICTIONARY_DATA)
-        codec = None if batch is None else _member(batch, _BATCH_COMPRESSION)
-        if batch is not None and codec is not None:
+        codec = _member(batch, _BATCH_COMPRESSION)
+        if codec is not None:
             _reserve_expanded(batch, memoryview(message.body), budget)
-            compression = _CODECS[
-                codec.GetSlot(_slot(_COMPRESSION_CODEC), 0, number_types.Int8Flags)
-            ]
+            number = codec.GetSlot(_slot(_COMPRESSION_CODEC), 0, number_types.Int8Flags)
+            compression = _CODECS[number]
     return compression
 
 
