@@ -22,9 +22,9 @@ from derain.cards.card import load_card
 from derain.evaluation.text_tables import plain_table
 from derain.export.runtime import Derainer
 from derain.files import read_scan
-from derain.files.labels import label_beside, read_labels, semantic
+from derain.files.labels import label_beside, read_labels
 from derain.filters import DROR, FilterDerainer
-from derain.scan import Bools, Scan
+from derain.scan import Bools, Scan, class_ids
 from derain.simulation.campaign import Campaign
 from derain.simulation.classes import TrackClass
 from derain.simulation.dataset import simulate_track
@@ -119,7 +119,7 @@ def _simulated(layout: str, sensor: str, rate: float) -> tuple[Scan, Bools]:
         (path,) = (Path(folder) / "track/sequences/000").glob("lidar*/*.bin")
         (label,) = (Path(folder) / "track/sequences/000").glob("*labels*/*.label")
         scan = read_scan(path)
-        return scan, semantic(read_labels(label, len(scan))) == TrackClass.RAIN
+        return scan, class_ids(read_labels(label, len(scan))) == TrackClass.RAIN
 
 
 def _table_of_rates(title: str, of_place: Sequence[ByBoth]) -> str:
@@ -156,7 +156,7 @@ def _labelled(path: Path, scan: Scan) -> Bools | None:
     if not label.is_file():
         return None
     card = load_card("wads" if "wads" in path.parts else "kitti")
-    return card.rain_of(scan.with_label(semantic(read_labels(label, len(scan)))))
+    return card.rain_of(scan.with_label(read_labels(label, len(scan))))
 
 
 def _row(name: str, by_labels: ScanWeather | None, by_model: ScanWeather) -> list[str]:

@@ -14,8 +14,8 @@ from derain import files
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.files.format import FORMATS
-from derain.files.labels import read_labels, semantic
-from derain.scan import Scan
+from derain.files.labels import read_labels
+from derain.scan import Scan, class_ids
 
 
 def readers() -> list[Reader]:
@@ -73,7 +73,7 @@ def _read_scan(path: Path) -> None:
 
 
 def _read_labels(path: Path) -> None:
-    ids = semantic(read_labels(path, POINTS))
+    ids = class_ids(read_labels(path, POINTS))
     assert ids.shape == (POINTS,)
     assert 0 <= ids.min() <= ids.max() <= 0xFFFF
 

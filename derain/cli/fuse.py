@@ -36,7 +36,7 @@ from derain.files import write_scan
 from derain.files.atomic import replacing
 from derain.files.extrinsics import read_extrinsics
 from derain.files.frame_times import FRAME_COLUMNS, METADATA, read_frame_times
-from derain.files.labels import LABEL, instance, read_labels, semantic, write_labels
+from derain.files.labels import LABEL, instance, read_labels, write_labels
 from derain.fusion import LABEL_WITHIN, NO_DETECTIONS, fuse, nearest_in_time
 from derain.scan import Floats, Scan
 from derain.sources.folders import named_frames
@@ -121,7 +121,7 @@ def main(arguments: argparse.Namespace) -> int:
             detections = _read(partner, "--radar-columns")
         if arguments.labels is not None:
             label = read_labels(arguments.labels / f"{frame.key}{LABEL}", len(scan))
-            scan = scan.with_label(semantic(label))
+            scan = scan.with_label(label)
         fused = fuse(scan, detections, extrinsics, arguments.label_within, extra)
         write_scan(scans / f"{frame.key}{suffix}", fused)
         if label is not None and fused.label is not None:

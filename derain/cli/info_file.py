@@ -16,9 +16,9 @@ from derain.cards.card import DataCard, load_card
 from derain.cards.known import layouts_for
 from derain.errors import InputError
 from derain.evaluation.ray_counts import RayCounts
-from derain.files.labels import read_labels, semantic
+from derain.files.labels import read_labels
 from derain.files.reading import reading
-from derain.scan import Array, Scan
+from derain.scan import Array, Scan, class_ids
 from derain.sources.folders import frame_of
 from derain.sources.frame import Frame
 from derain.system.extras import CHECKPOINT_LIBRARIES, require
@@ -77,7 +77,7 @@ def _of_labels(path: Path) -> dict[str, Any]:
     labels, rest = divmod(path.stat().st_size, 4)
     if rest:
         raise InputError(path, "is not whole labels of 4 bytes", "Make the file again.")
-    ids, counts = np.unique(semantic(read_labels(path, labels)), return_counts=True)
+    ids, counts = np.unique(class_ids(read_labels(path, labels)), return_counts=True)
     return {
         "points": labels,
         "points by class id": dict(zip(map(str, ids), counts.tolist(), strict=True)),

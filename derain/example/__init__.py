@@ -10,7 +10,7 @@ from typing import Literal
 
 from derain.cards.card import load_card
 from derain.files import read_scan
-from derain.files.labels import read_labels, semantic
+from derain.files.labels import read_labels
 from derain.scan import Scan
 
 # What a user calls it where others name scans.
@@ -48,7 +48,7 @@ def example_scan(weather: Literal["rain", "snow"] = "snow") -> Scan:
     """
     scan = read_scan(example_file(weather))
     labels = example_file(weather).parents[1] / "lidar_radar_labels" / "000000.label"
-    return scan.with_label(semantic(read_labels(labels, len(scan))))
+    return scan.with_label(read_labels(labels, len(scan)))
 
 
 def or_example(path: Path) -> Path:

@@ -13,7 +13,7 @@ from derain.errors import InputError
 from derain.files.atomic import replacing
 from derain.files.names import beside
 from derain.files.reading import file_size, read_bytes, reading
-from derain.scan import LARGEST_ID, Array, Ints, class_ids
+from derain.scan import LARGEST_ID, Array, Ints
 
 LABEL = ".label"
 
@@ -35,7 +35,8 @@ def read_labels(path: Path, points: int) -> NDArray[np.uint32]:
         points: Number of points of the scan.
 
     Returns:
-        uint32 (points,): class in the low, instance in the high 16 bits.
+        uint32 (points,): class in the low, instance in the high 16 bits. Scans take them as labels,
+        and :func:`derain.scan.class_ids` gives the classes alone.
 
     Raises:
         InputError: A file that cannot be read, or that does not hold one label per point.
@@ -49,11 +50,6 @@ def read_labels(path: Path, points: int) -> NDArray[np.uint32]:
                 "Give the label file that belongs to the scan, and all of the scan's --columns.",
             )
         return np.frombuffer(read_bytes(path, size), "<u4", points).astype(np.uint32)
-
-
-def semantic(raw: NDArray[np.uint32]) -> Ints:
-    """Semantic class ids, int64 (N,), of labels as `read_labels` gives them."""
-    return class_ids(raw)
 
 
 def instance(raw: NDArray[np.uint32]) -> Ints:

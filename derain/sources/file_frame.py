@@ -6,10 +6,10 @@ from pathlib import Path
 
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS, count_points, read_scan
-from derain.files.labels import read_labels, semantic
+from derain.files.labels import read_labels
 from derain.files.names import scan_stem
 from derain.files.reading import file_size, is_file, read_bytes, reading, stamp_of
-from derain.scan import Floats, Ints, Scan
+from derain.scan import Floats, Ints, Scan, class_ids
 from derain.sources.frame import Frame
 from derain.sources.records import Records
 from derain.stores.url import url_of
@@ -67,7 +67,7 @@ class FileFrame(Frame):
         """Reads the semantic class ids of its points, int64 (N,)."""
         if self.label_path is None:
             raise InputError(self.path, "it has no labels", "Give its label file.")
-        return semantic(read_labels(self.label_path, points))
+        return class_ids(read_labels(self.label_path, points))
 
     def count_points(self) -> int:
         """Number of points of the scan; of plain rows, by the size of the file."""

@@ -12,9 +12,9 @@ from derain.annotation.scene import read_scene
 from derain.cli.main import module_of
 from derain.evaluation.hard_cases import scene
 from derain.files import read_scan, write_scan
-from derain.files.labels import read_labels, semantic
+from derain.files.labels import read_labels
 from derain.fusion import UNKNOWN
-from derain.scan import Scan
+from derain.scan import Scan, class_ids
 from derain.simulation.classes import TrackClass
 
 SCENE = """
@@ -38,7 +38,7 @@ def _sequence(here) -> None:
 
 
 def labels(out: Path, points: int = 2000) -> list[np.ndarray]:
-    return [semantic(read_labels(path, points)) for path in sorted(out.glob("*.label"))]
+    return [class_ids(read_labels(path, points)) for path in sorted(out.glob("*.label"))]
 
 
 def test_a_sequence_is_labelled_counted_and_drawn(succeed) -> None:

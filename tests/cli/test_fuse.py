@@ -9,8 +9,9 @@ import pytest
 from derain.evaluation.hard_cases import scene
 from derain.files import read_scan
 from derain.files.extrinsics import Extrinsics
-from derain.files.labels import instance, read_labels, semantic, write_labels
+from derain.files.labels import instance, read_labels, write_labels
 from derain.fusion import UNKNOWN
+from derain.scan import class_ids
 
 PLACE = Extrinsics.of_pose(0.5, 0, -0.7, 0, 0, 90)
 COLUMNS = "x,y,z,doppler,rcs,range,azimuth,elevation,probability,class"
@@ -74,9 +75,9 @@ def test_the_metadata_name_what_was_joined_to_what(succeed) -> None:
 def test_labels_reach_as_far_as_an_option_allows_and_instances_are_kept(succeed, reach) -> None:
     succeed(*FUSE, "--labels", "labels", "--label-within", str(reach))
     raw = read_labels(Path("out/lidar_radar_labels/000001.label"), 40 + 12)
-    np.testing.assert_array_equal(semantic(raw)[:40], np.arange(40) % 8)
+    np.testing.assert_array_equal(class_ids(raw)[:40], np.arange(40) % 8)
     np.testing.assert_array_equal(instance(raw), [*range(40), *[0] * 12])
-    np.testing.assert_array_equal(semantic(raw)[40:] != UNKNOWN, reach == 1000)
+    np.testing.assert_array_equal(class_ids(raw)[40:] != UNKNOWN, reach == 1000)
 
 
 def test_real_radar_detections_keep_their_doppler_and_rcs(succeed, shared) -> None:

@@ -3,7 +3,8 @@
 import pytest
 
 from derain.evaluation.counts import Counts
-from derain.files.labels import read_labels, semantic
+from derain.files.labels import read_labels
+from derain.scan import class_ids
 
 FALLING_SNOW = 110
 
@@ -15,7 +16,7 @@ def test_the_scores_are_the_published_ones(succeed, shared, here) -> None:
     succeed("export", "w.ckpt", "--out", "w.onnx", "--scan", sample, "--repeats", "1")
     succeed("run", "w.onnx", sample, "--out", "cleaned", "--threads", "2")
     points = 115_881
-    truth = semantic(read_labels(sample.with_suffix(".label"), points))
+    truth = class_ids(read_labels(sample.with_suffix(".label"), points))
     found = read_labels(here / "cleaned/sample.label", points)
     scores = Counts.of(found == 1, truth == FALLING_SNOW)
     assert scores.precision == pytest.approx(0.8950, abs=5e-4)

@@ -10,7 +10,8 @@ from benchmarks.recorded_bags import Ros, drive, table_of, write_bag
 from derain.cards.card import load_card
 from derain.cli.main import main
 from derain.evaluation.hard_cases import scene
-from derain.files.labels import read_labels, semantic, write_labels
+from derain.files.labels import read_labels, write_labels
+from derain.scan import class_ids
 
 if TYPE_CHECKING:
     from derain.models.outdet import OutDet
@@ -51,7 +52,7 @@ def prepare(folder: Path, simulated: Path) -> None:
     (folder / "my_data/sequences/00/classes").mkdir()
     for number, scan in enumerate(scans):
         size = scan.stat().st_size // 16
-        label = semantic(read_labels(sequence / f"lidar_radar_labels/{scan.stem}.label", size))
+        label = class_ids(read_labels(sequence / f"lidar_radar_labels/{scan.stem}.label", size))
         rain = label == SIMULATED_RAIN
         snow = np.where(rain, FALLING_SNOW, ROAD)
         _put(scan, folder / "drive", snow)
@@ -101,7 +102,7 @@ def _put(scan: Path, folder: Path, label: "np.ndarray[tuple[int], np.dtype[np.in
 def _put_troubles(folder: Path) -> None:
     """What may go wrong with the first of the scans: fog, units, maps, other files and folders."""
     cloud = np.fromfile(folder / "scans/000000.bin", np.float32).reshape(-1, 4)
-    rain = semantic(read_labels(folder / "scans/000000.label", len(cloud))) == FALLING_SNOW
+    rain = class_ids(read_labels(folder / "scans/000000.label", len(cloud))) == FALLING_SNOW
     dry = cloud[~rain]
     dry.tofile(folder / "dry.bin")
     dry[np.linalg.norm(dry[:, :3], axis=1) < FOG_ENDS].tofile(folder / "fog.bin")

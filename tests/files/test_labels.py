@@ -9,23 +9,24 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from derain import InputError
-from derain.files.labels import instance, read_labels, semantic, write_labels
+from derain.files.labels import instance, read_labels, write_labels
+from derain.scan import class_ids
 
 
 def test_halves_lie_where_semantickitti_puts_them(tmp_path) -> None:
     path = tmp_path / "scan.label"
     path.write_bytes(bytes([110, 0, 7, 0, 0xFC, 0x00, 0x01, 0x02]))
     raw = read_labels(path, points=2)
-    assert semantic(raw).tolist() == [110, 252]
+    assert class_ids(raw).tolist() == [110, 252]
     assert instance(raw).tolist() == [7, 0x0201]
-    assert semantic(raw).dtype == instance(raw).dtype == np.int64
+    assert class_ids(raw).dtype == instance(raw).dtype == np.int64
 
 
 @settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(raw=arrays(np.uint32, st.integers(0, 20)))
 def test_both_halves_come_back(tmp_path, raw) -> None:
     path = tmp_path / "scan.label"
-    write_labels(path, semantic(raw), instance(raw))
+    write_labels(path, class_ids(raw), instance(raw))
     assert path.read_bytes() == raw.astype("<u4").tobytes()
     np.testing.assert_array_equal(read_labels(path, len(raw)), raw)
 

@@ -10,8 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from derain.files.extrinsics import read_extrinsics
-from derain.files.labels import instance, read_labels, semantic
-from derain.scan import Floats
+from derain.files.labels import instance, read_labels
+from derain.scan import Floats, class_ids
 from derain.simulation.campaign import Campaign, Drive
 from derain.simulation.classes import TrackClass
 from derain.simulation.radar import Radar
@@ -128,10 +128,10 @@ def test_the_poses_of_a_drive_take_the_road_of_every_scan_to_the_same_place(driv
             assert np.linalg.norm(pose[:3, 3]) == pytest.approx(1.3 * frame.number, abs=0.1)
             world = scan.xyz @ pose[:3, :3].T + pose[:3, 3]
             # A plane, and within 20 m the beams meet it well.
-            road.append(world[(semantic(raw) == TrackClass.ROAD) & (scan.range < 20)])
+            road.append(world[(class_ids(raw) == TrackClass.ROAD) & (scan.range < 20)])
             moving = instance(raw) > 0
-            assert set(semantic(raw)[moving]) <= {TrackClass.CAR, TrackClass.PEDESTRIAN}
-            assert (semantic(raw) == TrackClass.RAIN).sum() > 50
+            assert set(class_ids(raw)[moving]) <= {TrackClass.CAR, TrackClass.PEDESTRIAN}
+            assert (class_ids(raw) == TrackClass.RAIN).sum() > 50
             seen |= set(instance(raw)[moving])
     middle = road[0].mean(axis=0)
     normal = np.linalg.svd(road[0] - middle, full_matrices=False)[2][2]

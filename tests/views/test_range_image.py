@@ -11,8 +11,8 @@ from hypothesis.extra import numpy as hnp
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases
 from derain.files import read_scan
-from derain.files.labels import label_beside, read_labels, semantic
-from derain.scan import Bools, Ints, Scan
+from derain.files.labels import label_beside, read_labels
+from derain.scan import Bools, Ints, Scan, class_ids
 from derain.views.back_projection import BACK_PROJECTIONS, REACH, ProjectedPoints
 from derain.views.candidates import Bound, Candidates
 from derain.views.grid_fit import fit_grid
@@ -201,7 +201,7 @@ def test_scores_come_back_by_the_named_back_projection(grid, back_projection, po
 
 def labelled(path: Path, snow: int = 110) -> tuple[Scan, Bools]:
     scan = read_scan(path)
-    return scan, semantic(read_labels(label_beside(path), len(scan))) == snow
+    return scan, class_ids(read_labels(label_beside(path), len(scan))) == snow
 
 
 def iou_of_perfect_pixels(view: RangeView, scan: Scan, rain: Bools) -> float:
