@@ -40,10 +40,8 @@ def main(arguments: argparse.Namespace) -> int:
         named_frames([arguments.scan], arguments.columns)[0].read()  # refuses what cannot be read
     settings = {} if epochs is None else {"trainer.max_epochs": epochs}
     print(f"Simulated rain, from streets to a table. Everything goes to {out}/\n")
-    run_demo(
-        DemoConfig(out, settings=settings, scan=arguments.scan, columns=arguments.columns),
-        print_lines,
-    )
+    config = DemoConfig(out, settings=settings, scan=arguments.scan, columns=arguments.columns)
+    run_demo(config, print_lines)
     pictures = "yours/before_after.png", "filters.png", "before_after.png", "bench/speed_error.png"
     print_lines(f"Pictures in {out}: {', '.join(pictures)}")
     print_lines(f"Training: tensorboard --logdir {out / 'runs'}")

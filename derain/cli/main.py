@@ -102,13 +102,9 @@ def main(arguments: list[str] | None = None) -> int:
             return _interrupted(leaving.__context__)
         raise
     except OSError as error:
-        return _refused(
-            InputError(
-                error.filename or "system",
-                error.strerror or str(error),
-                "Check the path, its permissions, and the free space on its disk.",
-            )
-        )
+        remedy = "Check the path, its permissions, and the free space on its disk."
+        subject = error.filename or "system"
+        return _refused(InputError(subject, error.strerror or str(error), remedy))
     except MemoryError:
         return _refused(InputError("memory", "it is full", "Process less at once."))
 

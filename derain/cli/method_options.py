@@ -11,15 +11,7 @@ from derain.cli.parser import Parser
 from derain.default import DEFAULT
 from derain.errors import InputError
 from derain.example import or_example
-from derain.export.methods import (
-    CHECKPOINT_SUFFIX,
-    PARAMETER_SUFFIXES,
-    is_method_name,
-    load_method,
-    method_hint,
-    named_method,
-    read_parameters,
-)
+from derain.export import methods
 from derain.export.runtimes.session import DEFAULT_RUNTIME, FLOAT32_PRECISION, Runtime
 from derain.files.format import FORMATS
 from derain.files.names import scan_suffix
@@ -30,7 +22,7 @@ from derain.sources.method import Method
 from derain.stores.url import Place, is_url, place_of
 
 # Suffixes of files that name a method, or, as a checkpoint does, are refused as one.
-METHOD_SUFFIXES = (".onnx", CHECKPOINT_SUFFIX, *PARAMETER_SUFFIXES)
+METHOD_SUFFIXES = (".onnx", methods.CHECKPOINT_SUFFIX, *methods.PARAMETER_SUFFIXES)
 
 
 def list_methods(parser: Parser, of_recordings: bool = True) -> None:
@@ -101,16 +93,16 @@ def method_of(method: str, arguments: argparse.Namespace) -> Method:
         InputError: No such method, parameters of another, or some that it cannot have.
     """
     runtime = runtime_of(arguments)
-    name, parameters = named_method(method)
+    name, parameters = methods.named_method(method)
     file = arguments.parameters
     if file is not None:
-        of_method, tuned = read_parameters(file)
+        of_method, tuned = methods.read_parameters(file)
         # Models are files, which have more than one name.
         if Path(of_method).resolve() != Path(name).resolve():
             reason = f"holds parameters of {of_method}, not of {name}"
             raise InputError(file, reason, f"Run {of_method} with it.")
         parameters |= tuned
-    return load_method(name, parameters | dict(arguments.set), arguments.threads, runtime)
+    return methods.load_method(name, parameters | dict(arguments.set), arguments.threads, runtime)
 
 
 def _assignment(text: str) -> tuple[str, int | float | str]:
@@ -177,9 +169,9 @@ def method_and_scans(
     folder, in_bag = os.path.isdir(path), split(path) is not None
     there = folder or in_bag or is_file(path)
     of_method = path.suffix in METHOD_SUFFIXES and not folder
-    named = of_method or (not path.suffix and is_method_name(first))
+    named = of_method or (not path.suffix and methods.is_method_name(first))
     if not (named or there):
-        remedy = f"{method_hint(first)}, and scans after it; or scans alone."
+        remedy = f"{methods.method_hint(first)}, and scans after it; or scans alone."
         raise InputError(first, "no such method, file or folder", remedy)
     # Formats come last: to look a suffix up may import what other packages bring.
     if not named and (not others or folder or in_bag or scan_suffix(path) in FORMATS):

@@ -52,16 +52,10 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from derain.cli import options, unit_options
+from derain.cli import options, unit_options, weather_options
 from derain.cli.method_options import add_method_and_scans, method_and_scans, method_of
 from derain.cli.outputs import exit_code, noting_progress, print_error, print_facts, print_lines
 from derain.cli.parser import Parser
-from derain.cli.weather_options import (
-    add_weather,
-    warn_of_bad_weather,
-    weather_options,
-    weather_table,
-)
 from derain.default import DEFAULT, model_card
 from derain.errors import InputError, printable
 from derain.example import Truth
@@ -136,7 +130,7 @@ def add_arguments(parser: Parser) -> None:
         action="store_true",
         help="bags: keep rows and columns of organised clouds; removed points become NaN",
     )
-    add_weather(parser)
+    weather_options.add_weather(parser)
     unit_options.add_units(parser)
     parser.use_rarely(*RARE)
 
@@ -159,7 +153,7 @@ def main(arguments: argparse.Namespace) -> int:
         source,
         arguments,
     )
-    weather = weather_options(arguments)
+    weather = weather_options.weather_of(arguments)
     sink = CleanSink(
         arguments.out,
         source,
@@ -169,7 +163,7 @@ def main(arguments: argparse.Namespace) -> int:
     )
     with (
         sink,
-        weather_table(arguments.weather, sink.targets()) as rows,
+        weather_options.weather_table(arguments.weather, sink.targets()) as rows,
         noting_progress(sink.so_far),
         unit_options.executor_of(arguments, workers) as executor,
     ):
@@ -196,7 +190,7 @@ def main(arguments: argparse.Namespace) -> int:
         printer.summarise(report)
     total = len(report.scans) + report.not_cleaned
     code = exit_code(report.not_cleaned, total, "{scans} could not be cleaned")
-    return code or warn_of_bad_weather(report.weather, arguments.fail_at)
+    return code or weather_options.warn_of_bad_weather(report.weather, arguments.fail_at)
 
 
 def _with_scans_around(method: Method, arguments: argparse.Namespace, several: bool) -> Method:

@@ -75,12 +75,7 @@ def main(arguments: argparse.Namespace) -> int:
     method, threads = arguments.method, arguments.threads
     if method in FILTERS:
         require("tune", OPTUNA)
-    from derain.workflows.tuning import (
-        bounds_of_rain,
-        tune_filter_on,
-        tune_model_on,
-        write_parameters,
-    )
+    from derain.workflows import tuning
 
     data = options.labelled(arguments.data, arguments, arguments.topic)
     frames = data.frames(arguments.part)
@@ -91,10 +86,10 @@ def main(arguments: argparse.Namespace) -> int:
     if method in FILTERS:
         candidates = None
         if arguments.candidates is not None:
-            candidates = bounds_of_rain(data, drawn, arguments.candidates)
+            candidates = tuning.bounds_of_rain(data, drawn, arguments.candidates)
             every = "every point: no bounds separate rain from the rest"
             print_lines(f"candidates: {candidates or every}")
-        tuned = tune_filter_on(
+        tuned = tuning.tune_filter_on(
             method,
             data,
             drawn,
@@ -107,7 +102,7 @@ def main(arguments: argparse.Namespace) -> int:
     elif arguments.candidates is not None:
         raise InputError("--candidates", "a model has its own", "Give it to `derain export`.")
     else:
-        tuned = tune_model_on(method, data, drawn, threads)
+        tuned = tuning.tune_model_on(method, data, drawn, threads)
     facts = (
         f"IoU {tuned.iou:.4f} on {len(drawn)} scans of {data.card.name}, "
         f"{tuned.default_iou:.4f} with the defaults"
@@ -117,7 +112,7 @@ def main(arguments: argparse.Namespace) -> int:
     if method != DEFAULT and method not in FILTERS:  # a model, named by the way from the YAML file
         folder = arguments.out.parent.resolve()
         named = Path(os.path.relpath(Path(method).resolve(), folder)).as_posix()
-    write_parameters(arguments.out, named, tuned.parameters, command, facts)
+    tuning.write_parameters(arguments.out, named, tuned.parameters, command, facts)
     print_lines(f"{method}: {facts}")
     for name, value in tuned.parameters.items():
         if name != CANDIDATES:  # printed already

@@ -41,13 +41,7 @@ from derain.cli.playback import refuse_unusable, write_and_report
 from derain.default import DEFAULT
 from derain.errors import InputError
 from derain.example import example_file, or_example
-from derain.export.methods import (
-    load_method,
-    load_method_of_one_scan,
-    named_method,
-    refuse_same_titles,
-    split_title,
-)
+from derain.export import methods
 from derain.sources.bag_frame import NUMBER, BagFrame
 from derain.sources.folders import frame_of, named_frames
 from derain.sources.frame import Frame
@@ -130,8 +124,8 @@ def main(arguments: argparse.Namespace) -> int:
 def _view_recording(arguments: argparse.Namespace) -> int:
     """Writes a recording as several methods clean it, for Rerun's viewer."""
     refuse_unusable(arguments.rerun)
-    methods = {
-        title: load_method(*named_method(name), arguments.threads)
+    compared = {
+        title: methods.load_method(*methods.named_method(name), arguments.threads)
         for title, name in _names_by_title(arguments.methods).items()
     }
     card = None if arguments.card is None else load_card(arguments.card)
@@ -152,21 +146,21 @@ def _view_recording(arguments: argparse.Namespace) -> int:
     if card is not None and not any(frame.has_labels for frame in selection.frames):
         warn(f"{selection.frames[0].name}: no scan has labels, so no truth is shown")
         card = None
-    for method in methods.values():
+    for method in compared.values():
         for sentence in irregularities(source, method.window):
             warn(sentence)
     labels = None if card is None else Labels(card)
-    return write_and_report(arguments.rerun, selection, methods, labels)
+    return write_and_report(arguments.rerun, selection, compared, labels)
 
 
-def _names_by_title(methods: Sequence[str]) -> dict[str, str]:
-    """Names or files of the methods by their titles, in order.
+def _names_by_title(words: Sequence[str]) -> dict[str, str]:
+    """Names or files of methods by their titles, in the order of the words of ``--methods``.
 
     Raises:
         InputError: Two methods of one title.
     """
-    named = [split_title(text) for text in methods]
-    refuse_same_titles([title for title, _ in named])
+    named = [methods.split_title(text) for text in words]
+    methods.refuse_same_titles([title for title, _ in named])
     return dict(named)
 
 
@@ -183,7 +177,7 @@ def _view_scan(path: Path, arguments: argparse.Namespace) -> None:
         if name in trivial:
             predicted[title] = trivial[name]
             continue
-        method = load_method_of_one_scan(*named_method(name), arguments.threads)
+        method = methods.load_method_of_one_scan(*methods.named_method(name), arguments.threads)
         judgement = method.judge(scan)
         notices.warn(frame.name, method.issues(judgement), title)
         predicted[title] = judgement.rain

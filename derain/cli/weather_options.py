@@ -75,7 +75,7 @@ def add_weather(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def weather_options(arguments: argparse.Namespace) -> WeatherOptions:
+def weather_of(arguments: argparse.Namespace) -> WeatherOptions:
     """The weather options of the arguments.
 
     Raises:
