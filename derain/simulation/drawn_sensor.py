@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, ClassVar, get_args
+from typing import Annotated, Any, ClassVar, get_args
 
 import numpy as np
 from numpy.random import Generator
@@ -14,8 +14,11 @@ from derain.simulation.sensor import MOST_BEAMS, ReturnMode, Sensor
 from derain.simulation.settings import LogSpan, Positive, Settings, Share, weights_of
 from derain.views.spherical_grid import ALL_AROUND, FULL_CIRCLE
 
-# Sensors of today have at most 256.
+# Numbers of rows, at least one. Sensors of today have at most 256.
 MOST_ROWS = 4096
+Rows = Annotated[
+    tuple[int, ...], lambda rows: rows and all(2 <= count <= MOST_ROWS for count in rows)
+]
 
 
 @dataclass(frozen=True)
@@ -109,20 +112,20 @@ class SensorSpans(Spans):
     kinds: Mapping[str, float] = field(
         default_factory=lambda: {"spinning": 0.7, "front": 0.2, "rosette": 0.1}
     )
-    spinning_rows: tuple[int, ...] = (16, 32, 40, 64, 128)
+    spinning_rows: Rows = (16, 32, 40, 64, 128)
     spinning_field: Span = (20.0, 90.0)
     spinning_centre: Span = (-12.0, 0.0)
     azimuth_step: LogSpan = (0.08, 0.4)
     uneven: Share = 0.5
     row_azimuth: Span = (0.0, 5.0)
-    front_rows: tuple[int, ...] = (64, 96, 128, 192, 256)
+    front_rows: Rows = (64, 96, 128, 192, 256)
     front_width: Span = (60.0, 120.0)
     front_height: Span = (12.0, 40.0)
     front_step: LogSpan = (0.08, 0.3)
     rosette_width: Span = (38.0, 75.0)
     rosette_beams: LogSpan = (10_000.0, 60_000.0)
     prism_turns: LogSpan = (8.0, 40.0)
-    most_beams: int = 150_000
+    most_beams: Annotated[int, lambda count: 1 <= count <= MOST_BEAMS] = 150_000
     returns: Mapping[str, float] = field(
         default_factory=lambda: {"strongest": 0.6, "last": 0.1, "dual": 0.3}
     )
@@ -146,17 +149,6 @@ class SensorSpans(Spans):
         "kinds": weights_of("spinning", "front", "rosette"),
         "returns": weights_of(*get_args(ReturnMode)),
     }
-
-    def _possible(self) -> dict[str, bool]:
-        return {
-            "spinning_rows": _are_rows(self.spinning_rows),
-            "front_rows": _are_rows(self.front_rows),
-            "most_beams": 1 <= self.most_beams <= MOST_BEAMS,
-        }
-
-
-def _are_rows(rows: tuple[int, ...]) -> bool:
-    return bool(rows) and all(2 <= count <= MOST_ROWS for count in rows)
 
 
 # The numbers of any sensor, drawn from the spans of their names.

@@ -21,6 +21,10 @@ GustForm = Literal["even", "gusts", "sheets", "filaments"]
 # development of very large snowflakes", for aggregates of several centimetres.
 SMALLEST, LARGEST = 0.2, 40.0
 
+# Finite numbers from 1 on, and numbers above 0 that may be infinite.
+Factor = Annotated[float, lambda value: 1 <= value < math.inf]
+Limit = Annotated[float, lambda value: value > 0]
+
 
 @dataclass(frozen=True)
 class Precipitation(Settings):
@@ -68,14 +72,14 @@ class Precipitation(Settings):
     number: float = 0.0
     diameter: Positive = 1.0
     shape: Positive = 1.0
-    largest: float = 6.0
-    reflectivity: float = 0.5
-    flicker: float = 0.0
-    spill: float = 1.0
+    largest: Annotated[float, lambda diameter: SMALLEST < diameter <= LARGEST] = 6.0
+    reflectivity: Annotated[float, lambda share: 0 < share <= 1] = 0.5
+    flicker: Annotated[float, lambda share: 0 <= share < 1] = 0.0
+    spill: Factor = 1.0
     reach: float = 0.0
     nearest: float = 0.0
-    cut_off: float = math.inf
-    crowding: float = math.inf
+    cut_off: Limit = math.inf
+    crowding: Limit = math.inf
     jitter: float = 0.0
     gust_form: GustForm = "even"
     gust_length: Positive = 5.0
@@ -88,19 +92,8 @@ class Precipitation(Settings):
     plume_length: Positive = 5.0
     haze: Share = 0.0
     haze_depth: Positive = 2.0
-    haze_strength: float = 10.0
+    haze_strength: Factor = 10.0
     haze_patches: float = 0.0
-
-    def _possible(self) -> dict[str, bool]:
-        return {
-            "largest": SMALLEST < self.largest <= LARGEST,
-            "reflectivity": 0 < self.reflectivity <= 1,
-            "flicker": 0 <= self.flicker < 1,
-            "spill": 1 <= self.spill < math.inf,
-            "cut_off": self.cut_off > 0,
-            "crowding": self.crowding > 0,
-            "haze_strength": 1 <= self.haze_strength < math.inf,
-        }
 
 
 # How the density varies where it does.
