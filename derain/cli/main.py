@@ -1,4 +1,17 @@
-"""The command ``derain``: runs a subcommand, and prints errors of the user in one line."""
+"""Takes the rain out of LiDAR and fused LiDAR + 4D-radar scans.
+
+  derain run scans/ --out cleaned                       clean scans with derain's own model
+  derain run model.onnx scans/ --out cleaned            with another model; or `run dror ...`
+  derain view scans/000000.bin --out figure.png         see which points are removed
+  derain info default                                   describe derain's own model
+  derain bench --data scans/ --methods default dsor     compare error and time
+  derain learn drive/ --out model.onnx                  learn from a recording without labels
+  derain fit --config outdet_wads.yaml --data.root WADS train on your data
+  derain export outdet.ckpt --out model.onnx            make a file that runs without torch
+  derain demo                                           all steps on simulated rain
+
+Rain means rain or snow, here and in all output.
+"""
 
 import argparse
 import io
@@ -15,22 +28,6 @@ from derain.cli.parser import Parser
 from derain.cli.signals import interrupting
 from derain.errors import InputError, ScanWarning
 from derain.system.extras import missing_extra
-
-DESCRIPTION = """\
-Takes the rain out of LiDAR and fused LiDAR + 4D-radar scans.
-
-  derain run scans/ --out cleaned                       clean scans with derain's own model
-  derain run model.onnx scans/ --out cleaned            with another model; or `run dror ...`
-  derain view scans/000000.bin --out figure.png         see which points are removed
-  derain info default                                   describe derain's own model
-  derain bench --data scans/ --methods default dsor     compare error and time
-  derain learn drive/ --out model.onnx                  learn from a recording without labels
-  derain fit --config outdet_wads.yaml --data.root WADS train on your data
-  derain export outdet.ckpt --out model.onnx            make a file that runs without torch
-  derain demo                                           all steps on simulated rain
-
-Rain means rain or snow, here and in all output.
-"""
 
 # What each command does, in order of use. Its module, of the same name, is imported when it is
 # chosen; those of TRAINING are Lightning's own, which parses their arguments itself.
@@ -160,7 +157,7 @@ def _run(arguments: list[str]) -> int:
 def _parser(command: str | None) -> Parser:
     """The parser, with the arguments of one command; it only lists the others."""
     parser = Parser(
-        "derain", description=DESCRIPTION, formatter_class=argparse.RawDescriptionHelpFormatter
+        "derain", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--version", action="version", version=f"derain {__version__}")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
