@@ -78,10 +78,8 @@ def _of_labels(path: Path) -> dict[str, Any]:
     if rest:
         raise InputError(path, "is not whole labels of 4 bytes", "Make the file again.")
     ids, counts = np.unique(class_ids(read_labels(path, labels)), return_counts=True)
-    return {
-        "points": labels,
-        "points by class id": dict(zip(map(str, ids), counts.tolist(), strict=True)),
-    }
+    by_class = dict(zip(map(str, ids), counts.tolist(), strict=True))
+    return {"points": labels, "points by class id": by_class}
 
 
 def _of_scan(scan: Scan, frame: Frame, card: DataCard | None) -> dict[str, Any]:

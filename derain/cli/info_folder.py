@@ -149,11 +149,8 @@ def facts_of_folder(
         rate_of_unit += [sequence.rain_rate] * len(of_sequence)
     job, shard = None, units
     if records is not None:
-        options = {
-            **shared_options("info", frames, block),
-            "folder": str(folder),
-            "layout": folders,
-        }
+        options = shared_options("info", frames, block)
+        options |= {"folder": str(folder), "layout": folders}
         job, shard = division.begin(records, options, units)
     places = () if records is None else (records,)
     task = Task(job, FrameCounting(), folder_of_paths(frames, *places))

@@ -109,11 +109,8 @@ def answers_figure(scan: Scan, card: DataCard, called_rain: Bools, title: str) -
         InputError: A scan without labels.
     """
     answer = answer_of(scan, card)
-    differs = np.select(
-        [called_rain & (answer == NOT_RAIN), ~called_rain & (answer == RAIN)],
-        [LOST, LEFT],
-        default=KEPT,
-    )
+    lost, left = called_rain & (answer == NOT_RAIN), ~called_rain & (answer == RAIN)
+    differs = np.select([lost, left], [LOST, LEFT], default=KEPT)
     panels = {
         "teacher": np.choose(answer, [KEPT, REMOVED, LEFT]),
         "student": np.where(called_rain, REMOVED, KEPT),

@@ -1,6 +1,5 @@
 """Moving objects of a sequence: the sensor's vehicle, cars, and people who walk."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -208,10 +207,4 @@ def _junction(street: Street, x: float, generator: Generator) -> float:
 
 
 # Ways to move near the sensor, by where it is then, metres along x.
-WAYS: tuple[Callable[[Street, float, Generator], Way], ...] = (
-    _car_ahead,
-    _car_oncoming,
-    _walker,
-    _car_crossing,
-    _walker_crossing,
-)
+WAYS = (_car_ahead, _car_oncoming, _walker, _car_crossing, _walker_crossing)

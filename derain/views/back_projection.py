@@ -1,6 +1,6 @@
 """Back-projection from pixels to points: whose score a point is given that lost its pixel."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,9 +54,6 @@ class ProjectedPoints:
     range: Float32s
     nearest: Float32s
     wraps: bool
-
-
-PixelsToPoints = Callable[[ProjectedPoints, Float32s], Float32s]
 
 
 def copy(points: ProjectedPoints, score: Float32s) -> Float32s:
@@ -124,11 +121,7 @@ def vote(points: ProjectedPoints, score: Float32s) -> Float32s:
 
 
 # Every back-projection, by the name that an option and a Spec have for it.
-BACK_PROJECTIONS: Mapping[str, PixelsToPoints] = {
-    "nearest range": nearest_range,
-    "copy": copy,
-    "vote": vote,
-}
+BACK_PROJECTIONS = {"nearest range": nearest_range, "copy": copy, "vote": vote}
 
 
 class _Window:

@@ -110,12 +110,8 @@ class Neighbourhoods(ViewedPoints):
         """The inputs, each as long as the scan has points, neighbourhoods or candidates."""
         if self.candidates is None:
             return dict.fromkeys(("points", "distances", "neighbours"), "points")
-        return {
-            "points": "points",
-            "distances": "neighbourhoods",
-            "neighbours": "neighbourhoods",
-            "candidates": "candidates",
-        }
+        of_neighbourhoods = dict.fromkeys(("distances", "neighbours"), "neighbourhoods")
+        return {"points": "points", **of_neighbourhoods, "candidates": "candidates"}
 
     @property
     def size(self) -> int:

@@ -1,6 +1,6 @@
 """Returns by a file's own columns: which is the first of its ray, and which follow."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -162,10 +162,4 @@ def _whole(column: Array) -> Ints:
     return np.where(np.abs(column) < 2**31, column, -1).astype(np.int64)
 
 
-_READERS: tuple[Callable[[Scan, Columns], StatedReturns | None], ...] = (
-    _from_numbers,
-    _from_las_bits,
-    _from_types,
-    _from_tags,
-    _from_second_ranges,
-)
+_READERS = (_from_numbers, _from_las_bits, _from_types, _from_tags, _from_second_ranges)

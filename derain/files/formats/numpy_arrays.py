@@ -169,11 +169,8 @@ def _array(data: bytes) -> Array:
     """The array of a .npy file, if the file is as long as its header states."""
     file = io.BytesIO(data)
     # The third version differs from the second in the encoding of names alone.
-    read_header = (
-        npy_format.read_array_header_1_0
-        if npy_format.read_magic(file) == (1, 0)
-        else npy_format.read_array_header_2_0
-    )
+    first = npy_format.read_magic(file) == (1, 0)
+    read_header = npy_format.read_array_header_1_0 if first else npy_format.read_array_header_2_0
     shape, _, dtype = read_header(file)
     size = math.prod(shape) * dtype.itemsize
     if size > len(data) - file.tell() and not dtype.hasobject:
