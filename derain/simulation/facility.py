@@ -9,7 +9,7 @@ intensity. With them, this network finds the simulated rain.
 `benchmarks/facility_observer.py` and `benchmarks/batchnorm_memory.py` show it.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from itertools import pairwise
 
@@ -19,7 +19,7 @@ from numpy.random import Generator
 from derain.scan import Floats
 from derain.simulation import objects
 from derain.simulation.classes import TrackClass
-from derain.simulation.objects import Surface
+from derain.simulation.objects import Surface, Surfaces
 from derain.simulation.track import Track
 
 
@@ -57,7 +57,7 @@ def on_slope(surfaces: Iterable[Surface], aside: float, heading: float, slope: F
     return Track.of(surface.placed(0, aside, heading).sloped(*slope) for surface in surfaces)
 
 
-def road_and_ground(half_width: float, generator: Generator) -> Iterator[Surface]:
+def road_and_ground(half_width: float, generator: Generator) -> Surfaces:
     """A road along x in patches, each dry or wet, and the ground on either side of it."""
     yield objects.ground((-10, 130), (-150, 150), generator)
     for x in pairwise([*np.arange(-10, 50, 1.5), 130]):
@@ -65,7 +65,7 @@ def road_and_ground(half_width: float, generator: Generator) -> Iterator[Surface
         yield objects.asphalt(x, (0, half_width), generator)
 
 
-def _traffic(half_width: float, generator: Generator) -> Iterator[Surface]:
+def _traffic(half_width: float, generator: Generator) -> Surfaces:
     kinds = (
         [objects.car] * generator.integers(1, 4)
         + [objects.pedestrian] * generator.integers(1, 4)
@@ -82,7 +82,7 @@ def _masts(generator: Generator) -> Floats:
     return np.arange(generator.uniform(6, 12), 60, generator.uniform(6, 10))
 
 
-def _verges(half_width: float, generator: Generator) -> Iterator[Surface]:
+def _verges(half_width: float, generator: Generator) -> Surfaces:
     for side in (-1, 1):
         for _ in range(generator.integers(20, 40)):
             x, y = generator.uniform(3, 25), side * (half_width + generator.uniform(0, 8))
@@ -98,13 +98,13 @@ def _verges(half_width: float, generator: Generator) -> Iterator[Surface]:
             yield objects.pole(generator).placed(x, y)
 
 
-def _boughs(half_width: float, generator: Generator) -> Iterator[Surface]:
+def _boughs(half_width: float, generator: Generator) -> Surfaces:
     for _ in range(generator.integers(5, 15)):
         x, y = generator.uniform(3, 15), generator.uniform(-half_width, half_width)
         yield objects.bough(1.5, generator).placed(x, y)
 
 
-def _buildings(half_width: float, generator: Generator) -> Iterator[Surface]:
+def _buildings(half_width: float, generator: Generator) -> Surfaces:
     for side in (-1, 1):
         for x in range(10, 110, 25):
             y = side * (half_width + generator.uniform(20, 50))
@@ -180,7 +180,7 @@ def _foliage(
     return replace(foliage, reflectivity=materials.uniform(*LEAVES, len(foliage.triangles)))
 
 
-def _road_users(half_width: float, generator: Generator) -> Iterator[Surface]:
+def _road_users(half_width: float, generator: Generator) -> Surfaces:
     taken = np.array([])
     for make, distances in ROAD_USERS:
         x = generator.uniform(*distances)
@@ -190,9 +190,7 @@ def _road_users(half_width: float, generator: Generator) -> Iterator[Surface]:
         yield make(generator).placed(x, generator.uniform(1.2 - half_width, half_width - 1.2))
 
 
-def _facility_verges(
-    half_width: float, generator: Generator, materials: Generator
-) -> Iterator[Surface]:
+def _facility_verges(half_width: float, generator: Generator, materials: Generator) -> Surfaces:
     for side in (-1, 1):
         for _ in range(generator.integers(10, 20)):
             radii = generator.uniform(0.3, 1.2, 3)
@@ -202,7 +200,7 @@ def _facility_verges(
             yield objects.pole(generator).placed(x, side * (half_width + 14))
 
 
-def _horizon(half_width: float, generator: Generator, materials: Generator) -> Iterator[Surface]:
+def _horizon(half_width: float, generator: Generator, materials: Generator) -> Surfaces:
     for side in (-1, 1):
         for x in np.arange(30.0, 110, 10):
             y, crown = side * (half_width + generator.uniform(15, 40)), generator.uniform(1.5, 3)

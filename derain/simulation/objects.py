@@ -48,6 +48,9 @@ class Surface:
         return replace(self, triangles=shapes.sloped(self.triangles, ahead, left))
 
 
+# Surfaces as they are made, one after the other.
+Surfaces = Iterator[Surface]
+
 # Something made at the origin, of one surface or of several.
 Make = Callable[[Generator], Surface | Iterable[Surface]]
 
@@ -150,7 +153,7 @@ def sprinkler(generator: Generator) -> Surface:
     return Surface(whole, TrackClass.SPRINKLER, generator.uniform(0.05, 0.5))
 
 
-def sprinklers(places: Floats, aside: float, generator: Generator) -> Iterator[Surface]:
+def sprinklers(places: Floats, aside: float, generator: Generator) -> Surfaces:
     """Sprinklers on both sides of the x axis, so far from it, at places along it, metres."""
     for x in places:
         yield sprinkler(generator).placed(x, aside)
@@ -169,7 +172,7 @@ def trunk(generator: Generator) -> Surface:
     return Surface(stem, BACKGROUND, generator.uniform(0.05, 0.3))
 
 
-def tree(crown: float, generator: Generator) -> Iterator[Surface]:
+def tree(crown: float, generator: Generator) -> Surfaces:
     """A tree with a round crown of a radius in metres."""
     yield trunk(generator)
     yield foliage((crown, crown, crown), 2 + crown, generator)
@@ -248,9 +251,7 @@ def specks(surface: Triangles, sensor: Floats, count: int, generator: Generator)
     return np.asarray(small[away > NEAREST_SPECK])
 
 
-def mirrored(
-    surface: Surface, sensor: Floats, count: int, generator: Generator
-) -> Iterator[Surface]:
+def mirrored(surface: Surface, sensor: Floats, count: int, generator: Generator) -> Surfaces:
     """A surface with specks that mirrors the light away and hides the things behind it.
 
     Args:

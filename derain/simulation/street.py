@@ -13,7 +13,7 @@ from numpy.random import Generator
 
 from derain.simulation import objects, shapes
 from derain.simulation.classes import TrackClass
-from derain.simulation.objects import Surface
+from derain.simulation.objects import Surface, Surfaces
 from derain.simulation.shapes import Triangles
 
 # How far the street goes on behind the first scan and ahead of the last, metres.
@@ -83,7 +83,7 @@ class Street:
         return any(x.min() < middle + half and x.max() > middle - half for middle in self.junctions)
 
 
-def lay_out_street(street: Street, generator: Generator) -> Iterator[Surface]:
+def lay_out_street(street: Street, generator: Generator) -> Surfaces:
     """Lays out the objects of a street.
 
     On both sides, all along and on both sides of its pavements: parked cars, bicycles, trees with
@@ -98,7 +98,7 @@ def lay_out_street(street: Street, generator: Generator) -> Iterator[Surface]:
                     yield surface
 
 
-def _ground(street: Street, generator: Generator) -> Iterator[Surface]:
+def _ground(street: Street, generator: Generator) -> Surfaces:
     begin, end = street.ends
     yield objects.ground((begin, end), (-150, 150), generator)
     right, left = street.beside(-1, PARKING), street.beside(1, PARKING)
@@ -111,7 +111,7 @@ def _ground(street: Street, generator: Generator) -> Iterator[Surface]:
         yield objects.asphalt(across, (left, 80), generator)
 
 
-def _parked(street: Street, side: int, generator: Generator) -> Iterator[Surface]:
+def _parked(street: Street, side: int, generator: Generator) -> Surfaces:
     for x in np.arange(*street.ends, LOT):
         kind = generator.choice([0, 1, 2], p=[0.6, 0.32, 0.08])  # none, a car, a bicycle
         make = (None, objects.car, objects.bike)[kind]
@@ -121,7 +121,7 @@ def _parked(street: Street, side: int, generator: Generator) -> Iterator[Surface
             yield make(generator).placed(x + generator.uniform(-0.4, 0.4), y, heading)
 
 
-def _pavement(street: Street, side: int, generator: Generator) -> Iterator[Surface]:
+def _pavement(street: Street, side: int, generator: Generator) -> Surfaces:
     kerb = street.beside(side, (PARKING + KERB) / 2)
     half = street.lane + PAVEMENT - PARKING + 0.01
     middle, width = street.beside(side, (PARKING + PAVEMENT) / 2), PAVEMENT - PARKING
@@ -141,7 +141,7 @@ def _pavement(street: Street, side: int, generator: Generator) -> Iterator[Surfa
         yield objects.pedestrian(generator).placed(x, y, generator.uniform(0, 2 * np.pi))
 
 
-def _verge(street: Street, side: int, generator: Generator) -> Iterator[Surface]:
+def _verge(street: Street, side: int, generator: Generator) -> Surfaces:
     for x in _scattered(street, 0.5, generator):
         length, width, height = generator.uniform(0.3, 1.5, 3)
         bush = objects.foliage((length, width, height), 0.7 * height, generator)
@@ -153,7 +153,7 @@ def _verge(street: Street, side: int, generator: Generator) -> Iterator[Surface]
         yield from _tree(x, street.beside(side, PAVEMENT + generator.uniform(2, 12)), generator)
 
 
-def _houses(street: Street, side: int, generator: Generator) -> Iterator[Surface]:
+def _houses(street: Street, side: int, generator: Generator) -> Surfaces:
     begin, end = street.ends
     while begin < end:
         house = objects.building(generator)
@@ -163,7 +163,7 @@ def _houses(street: Street, side: int, generator: Generator) -> Iterator[Surface
         begin += length + generator.uniform(0.5, 12)
 
 
-def _tree(x: float, y: float, generator: Generator) -> Iterator[Surface]:
+def _tree(x: float, y: float, generator: Generator) -> Surfaces:
     crown = generator.uniform(1, 2.5)
     yield from (part.placed(x, y) for part in objects.tree(crown, generator))
 

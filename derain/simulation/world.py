@@ -10,7 +10,6 @@ import numpy as np
 import yaml
 from numpy.random import Generator
 
-from derain.cards.card import load_card
 from derain.errors import InputError
 from derain.files import write_scan
 from derain.files.atomic import write_text
@@ -27,11 +26,9 @@ from derain.simulation.layouts import INDOORS, LAYOUTS
 from derain.simulation.places.carrier import lay_out_carrier
 from derain.simulation.places.horizon import lay_out_horizon
 from derain.simulation.sensor import Sensor
+from derain.simulation.sequence import FOLDERS
 from derain.simulation.settings import Settings, Share, weights_of
 from derain.simulation.track import Track
-
-# What the folders of a sequence are called.
-FOLDERS = load_card("simulated").layout
 
 # Of each sequence.
 STEM = "000000"

@@ -5,7 +5,7 @@ light away. Much of a carrier therefore returns a few scattered points, or none,
 things behind it.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from itertools import islice
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.random import Generator
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import Span, log_uniform, pick
-from derain.simulation.objects import PAINT, Surface, mirrored
+from derain.simulation.objects import PAINT, Surface, Surfaces, mirrored
 from derain.simulation.shapes import Point, Triangles, bars
 
 # Number of specks of a part that returns nothing else.
@@ -31,7 +31,7 @@ ON_A_CAR, ON_A_LORRY = 1.3, 2.4
 Parts = Iterator[Triangles]
 
 
-def lay_out_carrier(generator: Generator, mounting_height: float) -> Iterator[Surface]:
+def lay_out_carrier(generator: Generator, mounting_height: float) -> Surfaces:
     """Lays out what carries the sensor; nothing for every fifth sensor.
 
     It is upright under the sensor, whichever way the sensor itself is tilted. A sensor that moves
@@ -234,8 +234,7 @@ def _between(upper: Point, lower: Point) -> Triangles:
     return shapes.sheet(np.array(corners))
 
 
-Carrier = Callable[[Generator, float], Parts]
-CARRIERS_BY_HEIGHT: Sequence[dict[Carrier, float]] = (
+CARRIERS_BY_HEIGHT = (
     {_robot: 0.55, _tripod: 0.4, _mast: 0.05},
     {_car: 0.7, _tripod: 0.1, _robot: 0.1, _mast: 0.1},
     {_lorry: 0.5, _car: 0.2, _mast: 0.3},

@@ -1,6 +1,5 @@
 """A city street: windows, parked cars and bicycles, people, trees, scaffolds, cables."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +7,7 @@ from numpy.random import Generator
 
 from derain.simulation import objects
 from derain.simulation.drawing import along
-from derain.simulation.objects import Surface
+from derain.simulation.objects import Surfaces
 from derain.simulation.places import ground, openwork, placing, plants, road_users, walls
 from derain.simulation.track import Track
 
@@ -66,7 +65,7 @@ def lay_out_city(generator: Generator) -> Track:
     return placing.assemble(_ground(section, generator), standing, uneven, generator, over)
 
 
-def _ground(section: Section, generator: Generator) -> Iterator[Surface]:
+def _ground(section: Section, generator: Generator) -> Surfaces:
     surface = ground.COBBLES if generator.random() < 0.25 else ground.ASPHALT
     right, left = section.kerbs
     return ground.ground_mesh(
@@ -74,7 +73,7 @@ def _ground(section: Section, generator: Generator) -> Iterator[Surface]:
     )
 
 
-def _houses(section: Section, generator: Generator) -> Iterator[Surface]:
+def _houses(section: Section, generator: Generator) -> Surfaces:
     for side, front in zip((-1, 1), section.fronts, strict=True):
         gaps, piece = generator.uniform(0, 0.3), generator.uniform(9, 18)
         for house in placing.line_up(walls.facade, abs(front), CITY_SIGHT, piece, generator, gaps):
@@ -84,7 +83,7 @@ def _houses(section: Section, generator: Generator) -> Iterator[Surface]:
     yield from placing.place(far, CITY_SIGHT[1], 15, -np.pi / 2)
 
 
-def _parked(section: Section, generator: Generator) -> Iterator[Surface]:
+def _parked(section: Section, generator: Generator) -> Surfaces:
     for kerb, side in zip(section.kerbs, (-1, 1), strict=True):
         full = generator.uniform(0.1, 0.9)
         for x in along(*CITY_SIGHT, (5.8, 7.5), generator):
@@ -95,14 +94,14 @@ def _parked(section: Section, generator: Generator) -> Iterator[Surface]:
                 yield from placing.place(make(generator), x, y, heading)
 
 
-def _people(section: Section, generator: Generator) -> Iterator[Surface]:
+def _people(section: Section, generator: Generator) -> Surfaces:
     makes = placing.choose([(road_users.person, 8), (road_users.cyclist, 2)], 18, generator)
     count = int(generator.integers(4, 18))
     places = placing.free_places(count, (2.5, 55), 0.8, generator, section.on_a_pavement)
     yield from placing.scatter(makes, places, generator)
 
 
-def _furniture(section: Section, winter: bool, generator: Generator) -> Iterator[Surface]:
+def _furniture(section: Section, winter: bool, generator: Generator) -> Surfaces:
     """Trees, lamps, signs, bollards and railings along the kerbs; bushes in tubs."""
     for kerb, side in zip(section.kerbs, (-1, 1), strict=True):
         for x in along(*CITY_SIGHT, (6, 30), generator):
@@ -118,7 +117,7 @@ def _furniture(section: Section, winter: bool, generator: Generator) -> Iterator
             yield rail.placed(begin, kerb + side * 0.4)
 
 
-def _works(section: Section, generator: Generator) -> Iterator[Surface]:
+def _works(section: Section, generator: Generator) -> Surfaces:
     """A scaffold before a house, with or without a net."""
     if generator.random() < 0.5:
         side = int(generator.integers(2))
@@ -130,7 +129,7 @@ def _works(section: Section, generator: Generator) -> Iterator[Surface]:
             yield veil.placed(x, y - 0.15 if side else y + 1.3)
 
 
-def _cables(section: Section, generator: Generator) -> Iterator[Surface]:
+def _cables(section: Section, generator: Generator) -> Surfaces:
     """Cables from house to house, with lamps on them, and a tram's along the street."""
     if generator.random() < 0.6:
         height = generator.uniform(5, 7)

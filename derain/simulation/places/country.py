@@ -1,6 +1,6 @@
 """A country road: hedges, fences, grass, trees in leaf or bare, ploughed fields, snow."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
 
@@ -9,7 +9,7 @@ from numpy.random import Generator
 
 from derain.scan import Floats, Ints
 from derain.simulation.drawing import along
-from derain.simulation.objects import Surface
+from derain.simulation.objects import Surface, Surfaces
 from derain.simulation.places import ground, openwork, placing, plants
 from derain.simulation.track import Track
 
@@ -68,7 +68,7 @@ def lay_out_country(generator: Generator) -> Track:
     return placing.assemble(_ground(road, snowy, generator), standing, uneven, generator)
 
 
-def _ground(road: Road, snowy: bool, generator: Generator) -> Iterator[Surface]:
+def _ground(road: Road, snowy: bool, generator: Generator) -> Surfaces:
     surface = [ground.ASPHALT, ground.TRACK, ground.COBBLES][generator.choice(3, p=[0.6, 0.3, 0.1])]
     fields = [ground.SNOW] if snowy else [ground.FIELD, ground.MEADOW, ground.GRAVEL]
     beyond = [fields[which] for which in generator.integers(len(fields), size=2)]
@@ -83,7 +83,7 @@ def _ground(road: Road, snowy: bool, generator: Generator) -> Iterator[Surface]:
     yield from ground.ground_mesh([surface, verge, *beyond], kind_at, generator)
 
 
-def _verges(road: Road, generator: Generator) -> Iterator[Surface]:
+def _verges(road: Road, generator: Generator) -> Surfaces:
     for side in (-1, 1):
         for _ in range(generator.integers(1, 5)):
             count = int(generator.integers(50, 600))
@@ -111,13 +111,13 @@ def _boundary(
     return placing.line_up(make, line, COUNTRY_SIGHT, generator.uniform(4, 9), generator, gaps)
 
 
-def _bare_hedge(length: float, generator: Generator) -> Iterator[Surface]:
+def _bare_hedge(length: float, generator: Generator) -> Surfaces:
     height = generator.uniform(0.8, 2.5)
     for x in np.arange(0, length, 0.6):
         yield from placing.place(plants.brushwood(height, generator), x, 0)
 
 
-def _trees(road: Road, winter: bool, generator: Generator) -> Iterator[Surface]:
+def _trees(road: Road, winter: bool, generator: Generator) -> Surfaces:
     for side in (-1, 1):
         line, spacing = road.beside(side, generator.uniform(1.5, 10)), generator.uniform(6, 25)
         for x in along(*COUNTRY_SIGHT, (0.5 * spacing, spacing), generator):
@@ -125,7 +125,7 @@ def _trees(road: Road, winter: bool, generator: Generator) -> Iterator[Surface]:
             yield from placing.place(plants.tree(winter, generator), x, y, generator.uniform(0, 6))
 
 
-def _cables(road: Road, generator: Generator) -> Iterator[Surface]:
+def _cables(road: Road, generator: Generator) -> Surfaces:
     """Poles beside the road with one to four cables from each to the next."""
     line = road.beside(int(generator.choice([-1, 1])), generator.uniform(1.5, 6))
     spacing, height = generator.uniform(18, 40), generator.uniform(4.5, 8)

@@ -1,6 +1,5 @@
 """A parking garage: a low ceiling with pipes and lamps, pillars, mesh, things near on all sides."""
 
-from collections.abc import Iterator
 from itertools import product
 
 import numpy as np
@@ -8,7 +7,7 @@ from numpy.random import Generator
 
 from derain.simulation import shapes
 from derain.simulation.drawing import log_uniform
-from derain.simulation.objects import Make, Options, Piece, Surface, of_size
+from derain.simulation.objects import Make, Options, Piece, Surfaces, of_size
 from derain.simulation.places import ground, openwork, placing, plants, road_users, walls
 from derain.simulation.places.walls import Walls
 from derain.simulation.track import Track
@@ -49,7 +48,7 @@ def lay_out_garage(generator: Generator) -> Track:
     return placing.assemble(floor, standing, uneven, generator, [ceiling])
 
 
-def _under_the_ceiling(hall: Walls, generator: Generator) -> Iterator[Surface]:
+def _under_the_ceiling(hall: Walls, generator: Generator) -> Surfaces:
     """Pipes, trays, lamps, and loose cables that hang down."""
     top = hall.height - 0.05
     for _ in range(generator.integers(3, 12)):
@@ -72,7 +71,7 @@ def _under_the_ceiling(hall: Walls, generator: Generator) -> Iterator[Surface]:
         yield openwork.cable(start, end, generator.uniform(0.1, 0.9), (0.004, 0.03), generator)
 
 
-def _pillars(hall: Walls, generator: Generator) -> Iterator[Surface]:
+def _pillars(hall: Walls, generator: Generator) -> Surfaces:
     bay = generator.uniform(4.5, 8)
     side, rounded = generator.uniform(0.25, 0.7), generator.random() < 0.3
     shift = generator.uniform(0, bay, 2)
@@ -85,7 +84,7 @@ def _pillars(hall: Walls, generator: Generator) -> Iterator[Surface]:
             yield openwork.made([pillar], generator)
 
 
-def _walls(hall: Walls, generator: Generator) -> Iterator[Surface]:
+def _walls(hall: Walls, generator: Generator) -> Surfaces:
     (behind, ahead), (right, left) = hall.x, hall.y
     for number, (x, y) in enumerate(hall.corners):
         length = (ahead - behind) if number % 2 == 0 else (left - right)
@@ -99,7 +98,7 @@ def _walls(hall: Walls, generator: Generator) -> Iterator[Surface]:
         yield from placing.place(wall, x, y, number * np.pi / 2)
 
 
-def _parked(hall: Walls, generator: Generator) -> Iterator[Surface]:
+def _parked(hall: Walls, generator: Generator) -> Surfaces:
     full = generator.uniform(0.2, 0.9)
     for y, nose in ((hall.y[0] + 3, 1), (hall.y[1] - 3, -1)):
         for x in np.arange(hall.x[0] + 2, hall.x[1] - 2, 2.7):
@@ -108,7 +107,7 @@ def _parked(hall: Walls, generator: Generator) -> Iterator[Surface]:
                 yield from placing.place(road_users.glazed_car(generator), x, y, heading)
 
 
-def _about(hall: Walls, generator: Generator) -> Iterator[Surface]:
+def _about(hall: Walls, generator: Generator) -> Surfaces:
     """People and small things on the floor."""
     makes: list[Make] = [road_users.person] * int(generator.integers(3, 11))
     small: Options = [
@@ -125,7 +124,7 @@ def _about(hall: Walls, generator: Generator) -> Iterator[Surface]:
     yield from placing.scatter(placing.shuffled(makes, generator), places, generator)
 
 
-def _cages(hall: Walls, generator: Generator) -> Iterator[Surface]:
+def _cages(hall: Walls, generator: Generator) -> Surfaces:
     """Walls of mesh, nets and railings that part the hall."""
     kinds: list[Piece] = [
         openwork.chain_link,

@@ -1,6 +1,6 @@
 """Ground that is nowhere flat: hills, bumps down to the size of a stone, banks, rubble, logs."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,7 @@ from derain.scan import Float32s, Floats, Ints
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import Span, log_uniform, log_uniforms
-from derain.simulation.objects import Surface, spotted
+from derain.simulation.objects import Surface, Surfaces, spotted
 
 RELIEF_WAVES = 12
 WAVELENGTHS = (2.5, 60.0)
@@ -94,7 +94,7 @@ CONCRETE = GroundKind(TrackClass.ROAD, (0.001, 0.006), (0.1, 0.4), wet=0.1)
 
 def ground_mesh(
     kinds: Sequence[GroundKind], kind_at: Callable[[Floats, Floats], Ints], generator: Generator
-) -> Iterator[Surface]:
+) -> Surfaces:
     """The ground about the sensor: a plane with bumps, its mesh finest near the sensor.
 
     Args:

@@ -1,7 +1,7 @@
 """Things 50 to 280 m away, which few beams reach: rows of trees, hills, corners, pylons."""
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 from numpy.random import Generator
@@ -9,7 +9,7 @@ from numpy.random import Generator
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import log_uniform, log_uniforms
-from derain.simulation.objects import Surface, of_material
+from derain.simulation.objects import Surface, Surfaces, of_material
 from derain.simulation.places import openwork
 from derain.simulation.places.placing import place
 from derain.simulation.shapes import Triangles
@@ -28,7 +28,7 @@ HORIZON_REFLECTIVITY = (0.03, 0.9)
 RETROREFLECTIVE = (0.7, 1.0)
 
 
-def lay_out_horizon(generator: Generator) -> Iterator[Surface]:
+def lay_out_horizon(generator: Generator) -> Surfaces:
     """Lays out distant things, for any place outdoors.
 
     Args:
@@ -40,7 +40,7 @@ def lay_out_horizon(generator: Generator) -> Iterator[Surface]:
         of buildings, poles, masts, signs, cables, lorries and small things that glint.
     """
     yield _hills(generator)
-    kinds: list[tuple[Callable[[float, Generator], Iterator[Surface]], int]] = [
+    kinds: list[tuple[Callable[[float, Generator], Surfaces], int]] = [
         (_row_of_trees, 5),
         (_tree, 12),
         (_building, 8),
@@ -77,7 +77,7 @@ def _hills(generator: Generator) -> Surface:
     return Surface(triangles, TrackClass.BACKGROUND, usual * spread)
 
 
-def _row_of_trees(away: float, generator: Generator) -> Iterator[Surface]:
+def _row_of_trees(away: float, generator: Generator) -> Surfaces:
     """A row or an edge of a wood across the line of sight, of crowns that differ, with gaps."""
     half = min(generator.uniform(10, 90), 0.8 * away)
     spacing, gaps = generator.uniform(3, 10), generator.uniform(0, 0.6)
@@ -92,12 +92,12 @@ def _row_of_trees(away: float, generator: Generator) -> Iterator[Surface]:
         yield _plant(np.concatenate(parts), generator)
 
 
-def _tree(away: float, generator: Generator) -> Iterator[Surface]:
+def _tree(away: float, generator: Generator) -> Surfaces:
     """A tree by itself, its crown sparse or dense, on a stem."""
     yield _plant(_crown(900, generator), generator)
 
 
-def _scrub(away: float, generator: Generator) -> Iterator[Surface]:
+def _scrub(away: float, generator: Generator) -> Surfaces:
     """Bushes and stalks by the dozen, each seen by a beam or none."""
     count = int(log_uniform((10, 300), generator))
     spread = generator.uniform((1, 3), (4, 20)) / 2
@@ -122,7 +122,7 @@ def _crown(most: int, generator: Generator) -> Triangles:
     return np.concatenate([shapes.raised(leaves, middle), stem])
 
 
-def _building(away: float, generator: Generator) -> Iterator[Surface]:
+def _building(away: float, generator: Generator) -> Surfaces:
     """A building of one to three blocks with eaves, chimneys and aerials, its corner ahead."""
     for _ in range(generator.integers(1, 4)):
         length, width = generator.uniform(6, 25, 2)
@@ -141,7 +141,7 @@ def _building(away: float, generator: Generator) -> Iterator[Surface]:
             yield of_material([aerials], HORIZON_REFLECTIVITY, generator)
 
 
-def _poles(away: float, generator: Generator) -> Iterator[Surface]:
+def _poles(away: float, generator: Generator) -> Surfaces:
     """Lamps or poles in a line across, with arms; perhaps a cable from each to the next."""
     count, step = int(generator.integers(1, 8)), generator.uniform(8, 30)
     height, radius = generator.uniform(3, 12), log_uniform((0.02, 0.2), generator)
@@ -157,7 +157,7 @@ def _poles(away: float, generator: Generator) -> Iterator[Surface]:
             yield openwork.cable(start, end, generator.uniform(0.2, 1.5), (0.01, 0.06), generator)
 
 
-def _pylons(away: float, generator: Generator) -> Iterator[Surface]:
+def _pylons(away: float, generator: Generator) -> Surfaces:
     """Two lattice masts with arms and the cables between them."""
     height, apart = generator.uniform(12, 40), generator.uniform(30, 120)
     heads = []
@@ -170,7 +170,7 @@ def _pylons(away: float, generator: Generator) -> Iterator[Surface]:
         yield openwork.cable(start, end, 0.03 * apart, (0.015, 0.08), generator)
 
 
-def _sign(away: float, generator: Generator) -> Iterator[Surface]:
+def _sign(away: float, generator: Generator) -> Surfaces:
     """A retroreflecting sign, plate or marker post, towards the sensor or turned from it."""
     side, top = log_uniform((0.08, 3), generator), log_uniform((0.6, 7), generator)
     plate = shapes.box(0.03, side, top - side, top, heading=generator.normal(0, 0.6))
@@ -179,14 +179,14 @@ def _sign(away: float, generator: Generator) -> Iterator[Surface]:
     yield of_material([post], HORIZON_REFLECTIVITY, generator)
 
 
-def _glint(away: float, generator: Generator) -> Iterator[Surface]:
+def _glint(away: float, generator: Generator) -> Surfaces:
     """A lamp, a marker or a scrap of metal that returns light from afar, to one beam or two."""
     size, height = log_uniform((0.05, 0.5), generator), generator.uniform(-1, 8)
     glint = shapes.raised(shapes.leaves(np.zeros((1, 3)), size, generator), height)
     yield Surface(glint, TrackClass.BACKGROUND, generator.uniform(*RETROREFLECTIVE))
 
 
-def _vehicle(away: float, generator: Generator) -> Iterator[Surface]:
+def _vehicle(away: float, generator: Generator) -> Surfaces:
     """A car or a lorry; some beams meet its lamps or the edges of its roof."""
     length, width, height = [(4.4, 1.8, 1.5), (10.0, 2.5, 3.6)][int(generator.random() < 0.3)]
     body = shapes.box(length, width, -1.0, height, heading=generator.uniform(-np.pi, np.pi))

@@ -1,13 +1,11 @@
 """A motorway: guard rails, gantries, noise walls, lorries, thin poles, embankments with scrub."""
 
-from collections.abc import Iterator
-
 import numpy as np
 from numpy.random import Generator
 
 from derain.simulation import objects, shapes
 from derain.simulation.drawing import along
-from derain.simulation.objects import Make, Piece, Surface
+from derain.simulation.objects import Make, Piece, Surfaces
 from derain.simulation.places import ground, openwork, placing, plants, road_users, walls
 from derain.simulation.track import Track
 
@@ -42,20 +40,20 @@ def lay_out_motorway(generator: Generator) -> Track:
     return placing.assemble(_ground(right, other, generator), standing, uneven, generator, over)
 
 
-def _ground(right: float, left: float, generator: Generator) -> Iterator[Surface]:
+def _ground(right: float, left: float, generator: Generator) -> Surfaces:
     verge = [ground.MEADOW, ground.GRAVEL, ground.SNOW][generator.choice(3, p=[0.6, 0.25, 0.15])]
     return ground.ground_mesh(
         [ground.ASPHALT, verge], lambda x, y: np.where((y > right) & (y < left), 0, 1), generator
     )
 
 
-def _rails(lines: tuple[float, ...], generator: Generator) -> Iterator[Surface]:
+def _rails(lines: tuple[float, ...], generator: Generator) -> Surfaces:
     for y in lines:
         make = openwork.guard_rail if generator.random() < 0.7 else openwork.wire_fence
         yield from placing.line_up(make, y, MOTORWAY_SIGHT, 16, generator, gaps=0.05)
 
 
-def _driving(lanes: int, own: int, median: float, generator: Generator) -> Iterator[Surface]:
+def _driving(lanes: int, own: int, median: float, generator: Generator) -> Surfaces:
     """Cars and lorries in every lane, in the sensor's own at a distance."""
     for lane in range(2 * lanes):
         own_carriageway = lane < lanes
@@ -70,7 +68,7 @@ def _driving(lanes: int, own: int, median: float, generator: Generator) -> Itera
             yield from placing.place(make(generator), x, y + generator.normal(0, 0.2), heading)
 
 
-def _breakdown(right: float, generator: Generator) -> Iterator[Surface]:
+def _breakdown(right: float, generator: Generator) -> Surfaces:
     """Objects on the hard shoulder and behind the rail: a waiting person, workers, cones, a car."""
 
     def on_the_shoulder(x: float, y: float) -> bool:
@@ -82,7 +80,7 @@ def _breakdown(right: float, generator: Generator) -> Iterator[Surface]:
     yield from placing.scatter(makes, places, generator)
 
 
-def _beside(edges: tuple[float, float], generator: Generator) -> Iterator[Surface]:
+def _beside(edges: tuple[float, float], generator: Generator) -> Surfaces:
     """Delineators, signs, emergency telephones and lamps; weeds, and what lies on the shoulder."""
     for y, side in zip(edges, (-1, 1), strict=True):
         count = int(generator.integers(20, 300))
@@ -96,7 +94,7 @@ def _beside(edges: tuple[float, float], generator: Generator) -> Iterator[Surfac
             yield from placing.place(pole, x, y + side * generator.uniform(0.8, 3))
 
 
-def _gantries(edges: tuple[float, float], generator: Generator) -> Iterator[Surface]:
+def _gantries(edges: tuple[float, float], generator: Generator) -> Surfaces:
     """Girders of lattice across the road, with signs; now and then cables."""
     for x in along(12, 110, (25, 80), generator):
         height = generator.uniform(5.5, 7.5)
@@ -114,7 +112,7 @@ def _gantries(edges: tuple[float, float], generator: Generator) -> Iterator[Surf
             yield openwork.cable(start, end, generator.uniform(1, 3), (0.02, 0.06), generator)
 
 
-def _embankments(edges: tuple[float, float], generator: Generator) -> Iterator[Surface]:
+def _embankments(edges: tuple[float, float], generator: Generator) -> Surfaces:
     """Beyond the road: a noise wall, a fence and scrub, or a bank with trees."""
     for y, side in zip(edges, (-1, 1), strict=True):
         make, out, piece, gaps = EMBANKMENTS[generator.integers(len(EMBANKMENTS))]
@@ -129,7 +127,7 @@ def _embankments(edges: tuple[float, float], generator: Generator) -> Iterator[S
             yield from placing.place(scrub, x, away + side * generator.uniform(0.5, 6))
 
 
-def _noise_wall(length: float, generator: Generator) -> Iterator[Surface]:
+def _noise_wall(length: float, generator: Generator) -> Surfaces:
     height = generator.uniform(2, 5)
     yield walls.rough_wall(length, height, generator)
     post = (0, -0.1, 0), (0, -0.1, height + 0.1)

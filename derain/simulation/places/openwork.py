@@ -3,15 +3,13 @@
 Threads are drawn as wide as beams see them, from some millimetres to some centimetres.
 """
 
-from collections.abc import Iterator
-
 import numpy as np
 from numpy.random import Generator
 
 from derain.scan import Floats
 from derain.simulation import shapes
 from derain.simulation.drawing import Span, log_uniform
-from derain.simulation.objects import Surface, of_material
+from derain.simulation.objects import Surface, Surfaces, of_material
 from derain.simulation.shapes import Point, Triangles, bars
 
 FRAME_REFLECTIVITY = (0.03, 0.7)
@@ -39,7 +37,7 @@ def railing(length: float, generator: Generator) -> Surface:
     return made([bars(upright, radius), bars([*level, *braces], 1.8 * radius)], generator)
 
 
-def scaffold(length: float, generator: Generator) -> Iterator[Surface]:
+def scaffold(length: float, generator: Generator) -> Surfaces:
     """Tubes and boards along x, from x = 0 on, two or three storeys high."""
     storeys, depth = generator.integers(1, 4), generator.uniform(0.7, 1.2)
     step, storey, radius = generator.uniform(1.8, 2.6), 2.0, generator.uniform(0.02, 0.035)
@@ -82,7 +80,7 @@ def lattice(start: Point, end: Point, width: float, generator: Generator) -> Sur
     return made(wood, generator)
 
 
-def guard_rail(length: float, generator: Generator) -> Iterator[Surface]:
+def guard_rail(length: float, generator: Generator) -> Surfaces:
     """A steel guard rail along x, from x = 0 on: a band on posts."""
     profile = np.array([[0, 0.45], [0.05, 0.52], [0, 0.6], [0.05, 0.68], [0, 0.75]])
     x = np.linspace(0, length, max(2, int(length / 4)))
@@ -142,7 +140,7 @@ def net(length: float, height: float, generator: Generator) -> Surface:
     return _strung(_ribbons(starts[whole], ends[whole], width), generator)
 
 
-def chain_link(length: float, generator: Generator) -> Iterator[Surface]:
+def chain_link(length: float, generator: Generator) -> Surfaces:
     """A fence of diagonal wire along x, from x = 0 on, with its posts."""
     height, mesh = generator.uniform(1, 2.2), generator.uniform(0.05, 0.14)
     width = log_uniform((0.003, 0.012), generator)
@@ -159,7 +157,7 @@ def chain_link(length: float, generator: Generator) -> Iterator[Surface]:
     yield from posts(length, height + 0.05, generator)
 
 
-def wire_fence(length: float, generator: Generator) -> Iterator[Surface]:
+def wire_fence(length: float, generator: Generator) -> Surfaces:
     """A fence of a few level wires along x, barbed or not, with its posts."""
     height = generator.uniform(0.8, 1.5)
     for z in np.linspace(height / generator.integers(2, 7), height, generator.integers(2, 7)):
@@ -168,7 +166,7 @@ def wire_fence(length: float, generator: Generator) -> Iterator[Surface]:
     yield from posts(length, height + 0.1, generator)
 
 
-def posts(length: float, height: float, generator: Generator) -> Iterator[Surface]:
+def posts(length: float, height: float, generator: Generator) -> Surfaces:
     """Posts of a fence along x, from x = 0 on, some of them crooked."""
     x = np.arange(0, length, generator.uniform(*POST_SPACING))
     feet = np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])

@@ -1,6 +1,6 @@
 """Sets things up around the sensor: at random, side by side, along lines."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from itertools import pairwise
 
@@ -10,9 +10,10 @@ from numpy.random import Generator
 from derain.scan import Floats
 from derain.simulation import objects, shapes
 from derain.simulation.drawing import Span, log_uniform
-from derain.simulation.objects import Make, Options, Piece, Surface, of_size
+from derain.simulation.objects import Make, Options, Piece, Surface, Surfaces, of_size
 from derain.simulation.places import ground, openwork, plants, road_users
 from derain.simulation.places.ground import Relief
+from derain.simulation.shapes import Place
 from derain.simulation.track import Track
 
 # Whether something may stand at an x and a y.
@@ -40,7 +41,7 @@ def anywhere(x: float, y: float) -> bool:
 
 def free_places(
     count: int, distances: Span, apart: float, generator: Generator, allowed: Allowed = anywhere
-) -> list[tuple[float, float]]:
+) -> list[Place]:
     """Places about the sensor, as many within each doubling of the distance.
 
     Args:
@@ -50,7 +51,7 @@ def free_places(
         generator: Random generator.
         allowed: Function that allows places.
     """
-    taken: list[tuple[float, float]] = []
+    taken: list[Place] = []
     for number in range(count):
         for _ in range(PLACING_TRIES):
             distance = log_uniform(distances, generator)
@@ -63,9 +64,7 @@ def free_places(
     return taken
 
 
-def scatter(
-    makes: Iterable[Make], places: Iterable[tuple[float, float]], generator: Generator
-) -> Iterator[Surface]:
+def scatter(makes: Iterable[Make], places: Iterable[Place], generator: Generator) -> Surfaces:
     """One thing at each place, turned at random.
 
     Args:
@@ -86,7 +85,7 @@ def shuffled(makes: Iterable[Make], generator: Generator) -> list[Make]:
 
 def place(
     things: Surface | Iterable[Surface], x: float, y: float, heading: float = 0.0
-) -> Iterator[Surface]:
+) -> Surfaces:
     """A thing turned by a heading in radians, then moved to (x, y)."""
     for surface in [things] if isinstance(things, Surface) else things:
         yield surface.placed(x, y, heading)
@@ -94,7 +93,7 @@ def place(
 
 def line_up(
     make: Piece, line: Line | float, x: Span, piece: float, generator: Generator, gaps: float = 0.0
-) -> Iterator[Surface]:
+) -> Surfaces:
     """Pieces of a hedge, a fence or a wall, end to end along a line.
 
     Args:
@@ -177,7 +176,7 @@ NEAREST, FARTHEST = 2.2, 70.0
 
 def users(
     generator: Generator, allowed: Allowed = anywhere, *, walkers: Counts, cars: Counts
-) -> Iterator[Surface]:
+) -> Surfaces:
     """People, up to four cyclists, and vehicles.
 
     Args:
@@ -203,7 +202,7 @@ def users(
 
 def ragged_things(
     generator: Generator, allowed: Allowed = anywhere, *, count: Counts, leafy: bool = True
-) -> Iterator[Surface]:
+) -> Surfaces:
     """Bushes, brushwood, nets, pieces of fence, poles, grass, rubble, near the sensor and far.
 
     Args:

@@ -4,8 +4,6 @@ A ray hits a leaf or misses it, while a beam is often filled by it only in part;
 spread of reflectivity.
 """
 
-from collections.abc import Iterator
-
 import numpy as np
 from numpy.random import Generator
 
@@ -13,7 +11,7 @@ from derain.scan import Floats
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import log_uniform, log_uniforms
-from derain.simulation.objects import Surface
+from derain.simulation.objects import Surface, Surfaces
 from derain.simulation.shapes import Triangles
 
 PLANT_REFLECTIVITY = (0.01, 0.6)
@@ -40,7 +38,7 @@ def bush(radii: tuple[float, float, float], generator: Generator) -> Surface:
     return _plant(shapes.raised(_leaves(radii, generator), 0.9 * radii[2]), generator)
 
 
-def crowned_tree(generator: Generator) -> Iterator[Surface]:
+def crowned_tree(generator: Generator) -> Surfaces:
     """A tree in leaf, from a sapling to one of 12 m."""
     height = log_uniform((2.0, 12.0), generator)
     radii = height * generator.uniform(0.12, 0.35, 3)
@@ -54,7 +52,7 @@ def bare_tree(generator: Generator) -> Surface:
     return _plant(_boughs(log_uniform((2.0, 10.0), generator), 6, generator), generator)
 
 
-def tree(winter: bool, generator: Generator) -> Surface | Iterator[Surface]:
+def tree(winter: bool, generator: Generator) -> Surface | Surfaces:
     """A bare tree in winter, else one in leaf."""
     return bare_tree(generator) if winter else crowned_tree(generator)
 

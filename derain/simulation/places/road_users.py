@@ -1,6 +1,6 @@
 """People, cyclists and vehicles as a sensor meets them: striding, loaded, with open windows."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.random import Generator
@@ -9,7 +9,7 @@ from derain.scan import Floats
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import log_uniform
-from derain.simulation.objects import Surface, of_material
+from derain.simulation.objects import Surface, Surfaces, of_material
 from derain.simulation.places.openwork import pane
 from derain.simulation.shapes import Point, Triangles, bars
 
@@ -139,7 +139,7 @@ CLOTH = (0.05, 0.5)
 RUBBER = (0.02, 0.1)
 
 
-def glazed_car(generator: Generator) -> Iterator[Surface]:
+def glazed_car(generator: Generator) -> Surfaces:
     """A car along x, from a small one to a van: body, pillars, roof, windows, seats, mirrors."""
     length, width = generator.uniform(3.4, 5.4), generator.uniform(1.6, 2.0)
     sill, roof = generator.uniform(0.8, 1.1), generator.uniform(1.4, 2.1)
@@ -160,7 +160,7 @@ def glazed_car(generator: Generator) -> Iterator[Surface]:
     yield of_material([_wheels(0.31 * length, width)], RUBBER, generator, TrackClass.CAR)
 
 
-def lorry(generator: Generator) -> Iterator[Surface]:
+def lorry(generator: Generator) -> Surfaces:
     """A lorry along x: a cab with windows, a box with a wavy tarpaulin, an open chassis."""
     length, width, top = generator.uniform(5, 13), 2.5, generator.uniform(2.8, 4.0)
     cab = shapes.box(1.8, 2.4, 0.5, 1.6, at=(length / 2 + 1.1, 0))

@@ -1,6 +1,5 @@
 """Rooms: furnished ones, corridors, staircases, with all that is near on every side."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +9,7 @@ from derain.scan import Bools
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import log_uniform
-from derain.simulation.objects import Options, Surface, mirrored, of_size
+from derain.simulation.objects import Options, Surface, Surfaces, mirrored, of_size
 from derain.simulation.places import openwork, placing, plants, road_users
 from derain.simulation.places.openwork import made, railing
 from derain.simulation.places.walls import Walls, shell
@@ -62,7 +61,7 @@ def _cleared(surface: Surface) -> Surface:
     return replace(surface, triangles=surface.triangles[far], reflectivity=reflectivity)
 
 
-def _polished(surface: Surface, generator: Generator) -> Iterator[Surface]:
+def _polished(surface: Surface, generator: Generator) -> Surfaces:
     """The thing unchanged, or of polished metal, black glass or lacquer, seen in a few specks."""
     if generator.random() > POLISHED or surface.label != TrackClass.BACKGROUND:
         yield surface
@@ -80,7 +79,7 @@ def _about_axis(triangles: shapes.Triangles) -> Bools:
     return np.asarray(left | right)
 
 
-def _below_the_ceiling(room: Walls, generator: Generator) -> Iterator[Surface]:
+def _below_the_ceiling(room: Walls, generator: Generator) -> Surfaces:
     """Lamps on wires, pipes, trays, cables that hang down."""
     for _ in range(generator.integers(1, 8)):
         x, y = generator.uniform(*room.x), generator.uniform(*room.y)
@@ -103,7 +102,7 @@ def _below_the_ceiling(room: Walls, generator: Generator) -> Iterator[Surface]:
         yield openwork.cable(start, end, generator.uniform(0, 0.3), (0.003, 0.015), generator)
 
 
-def _furniture(room: Walls, generator: Generator) -> Iterator[Surface]:
+def _furniture(room: Walls, generator: Generator) -> Surfaces:
     """Furniture, the more the larger the room, from bare to cluttered."""
     options: Options = [
         (table, 4),
@@ -123,7 +122,7 @@ def _furniture(room: Walls, generator: Generator) -> Iterator[Surface]:
     yield from placing.scatter(makes, places, generator)
 
 
-def _people(room: Walls, most: int, generator: Generator) -> Iterator[Surface]:
+def _people(room: Walls, most: int, generator: Generator) -> Surfaces:
     """Somebody at an arm's length or at the other end of the room."""
     count = int(generator.integers(0, most))
     places = placing.free_places(count, (0.6, 8.0), 0.5, generator, room.holds)
@@ -136,7 +135,7 @@ def _twigs(generator: Generator) -> Surface:
     return twigs.moved(0, 0, generator.choice([0.0, generator.uniform(0, 1)]))
 
 
-def _along_a_corridor(room: Walls, generator: Generator) -> Iterator[Surface]:
+def _along_a_corridor(room: Walls, generator: Generator) -> Surfaces:
     """Doors ajar with their handles, pipes, cabinets, and little else."""
     lengthwise = room.x[1] - room.x[0] > room.y[1] - room.y[0]
     ends, sides = (room.x, room.y) if lengthwise else (room.y, room.x)
@@ -153,7 +152,7 @@ def _along_a_corridor(room: Walls, generator: Generator) -> Iterator[Surface]:
     yield from placing.scatter(chosen, places, generator)
 
 
-def _stairs(room: Walls, generator: Generator) -> Iterator[Surface]:
+def _stairs(room: Walls, generator: Generator) -> Surfaces:
     """A flight that rises from the sensor's floor, another above it, and their railings."""
     rise, tread, width = generator.uniform(0.15, 0.2), generator.uniform(0.25, 0.32), 1.2
     closed = generator.random() < 0.5
@@ -172,7 +171,7 @@ def _stairs(room: Walls, generator: Generator) -> Iterator[Surface]:
         yield from placing.place(parts, turned * np.cos(heading), 0.6 * np.sign(heading), heading)
 
 
-def table(generator: Generator) -> Iterator[Surface]:
+def table(generator: Generator) -> Surfaces:
     """A table on four legs or a trestle, scatter with papers, screens, cups and cables."""
     length, width = generator.uniform(0.6, 2.2), generator.uniform(0.5, 1.0)
     top = generator.uniform(0.65, 1.05)
@@ -211,7 +210,7 @@ def chair(generator: Generator) -> Surface:
     return made([*parts, bars(rods, radius)], generator)
 
 
-def shelf(generator: Generator) -> Iterator[Surface]:
+def shelf(generator: Generator) -> Surfaces:
     """Boards between uprights, full of books, boxes, folders and gaps of all depths."""
     length, depth = generator.uniform(0.6, 2.5), generator.uniform(0.25, 0.6)
     boards = np.arange(0.1, generator.uniform(0.9, 2.3), generator.uniform(0.28, 0.5))
@@ -232,7 +231,7 @@ def shelf(generator: Generator) -> Iterator[Surface]:
             x += width + generator.choice([0.0, 0.01, 0.1])
 
 
-def pot_plant(generator: Generator) -> Iterator[Surface]:
+def pot_plant(generator: Generator) -> Surfaces:
     """A plant of leaves or of long blades in a pot."""
     height, radius = generator.uniform(0.15, 0.5), generator.uniform(0.08, 0.25)
     yield made([shapes.cylinder(radius, 0, height)], generator)
@@ -257,7 +256,7 @@ def standing_lamp(generator: Generator) -> Surface:
     return made([*parts, bars(arms, radius)] if arms else parts, generator)
 
 
-def machine(generator: Generator) -> Iterator[Surface]:
+def machine(generator: Generator) -> Surfaces:
     """A machine of a lab: boxes on each other, pipes, a hood, hoses."""
     length, width = generator.uniform(0.4, 1.5, 2)
     top = 0.0

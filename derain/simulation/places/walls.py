@@ -1,6 +1,5 @@
 """Walls: of houses, with windows and fixtures, and of rooms."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 
@@ -9,10 +8,10 @@ from numpy.random import Generator
 
 from derain.simulation import shapes
 from derain.simulation.drawing import Span, log_uniform
-from derain.simulation.objects import Surface, of_material, spotted
+from derain.simulation.objects import Surface, Surfaces, of_material, spotted
 from derain.simulation.places.openwork import cable, made, pane, railing
 from derain.simulation.places.placing import place
-from derain.simulation.shapes import Point, bars
+from derain.simulation.shapes import Place, Point, bars
 
 STONE = (0.08, 0.7)
 GLASS = (0.01, 0.2)
@@ -35,9 +34,7 @@ def rough_wall(length: float, height: float, generator: Generator, cell: float =
     return spotted(shapes.sheet(corners), STONE, 0.15, generator)
 
 
-def laid_flat(
-    wall: Surface, corner: tuple[float, float], height: float, bumps: float = 1.0
-) -> Surface:
+def laid_flat(wall: Surface, corner: Place, height: float, bumps: float = 1.0) -> Surface:
     """A rough wall laid down as a floor or as a ceiling.
 
     Args:
@@ -51,7 +48,7 @@ def laid_flat(
     return replace(wall, triangles=lying)
 
 
-def facade(length: float, generator: Generator) -> Iterator[Surface]:
+def facade(length: float, generator: Generator) -> Surfaces:
     """A house's front along x, from x = 0 on, with rooms behind its windows; seen from -y."""
     storeys, storey = int(generator.integers(1, 5)), generator.uniform(2.6, 3.4)
     height, bay = storeys * storey, generator.uniform(1.8, 3.6)
@@ -80,9 +77,7 @@ def facade(length: float, generator: Generator) -> Iterator[Surface]:
     yield from _on_the_front(length, height, storey, generator)
 
 
-def _on_the_front(
-    length: float, height: float, storey: float, generator: Generator
-) -> Iterator[Surface]:
+def _on_the_front(length: float, height: float, storey: float, generator: Generator) -> Surfaces:
     """Fixtures on the front of a house: drain pipes, balconies, wires, ivy, an aerial."""
     pipes = [((x, -0.1, 0), (x, -0.1, height)) for x in generator.uniform(0, length, 2)]
     yield of_material([bars(pipes, 0.05)], STONE, generator)
@@ -143,7 +138,7 @@ class Walls:
         return cls(x, y, generator.uniform(2.3, 4.5))
 
     @property
-    def corners(self) -> list[tuple[float, float]]:
+    def corners(self) -> list[Place]:
         """Seen from above, around."""
         (behind, ahead), (right, left) = self.x, self.y
         return [(behind, right), (ahead, right), (ahead, left), (behind, left)]
@@ -154,7 +149,7 @@ class Walls:
         return inside and self.y[0] + self.margin < y < self.y[1] - self.margin
 
 
-def shell(room: Walls, generator: Generator) -> Iterator[Surface]:
+def shell(room: Walls, generator: Generator) -> Surfaces:
     """Floor, ceiling and walls, closed except for windows and doorways."""
     length, width = room.x[1] - room.x[0], room.y[1] - room.y[0]
     for height, bumps in ((0.0, SMOOTH), (room.height, -SMOOTH)):
@@ -182,7 +177,7 @@ def shell(room: Walls, generator: Generator) -> Iterator[Surface]:
 
 def _pierced(
     length: float, height: float, opening: tuple[float, float, float], generator: Generator
-) -> Iterator[Surface]:
+) -> Surfaces:
     """A wall with an opening in the middle, by its width, lower and upper edge, and its frame."""
     wide, low, high = opening
     left, right = (length - wide) / 2, (length + wide) / 2
@@ -198,9 +193,7 @@ def _pierced(
     yield made([bars(edges, generator.uniform(0.02, 0.08))], generator)
 
 
-def _panes(
-    length: float, opening: tuple[float, float, float], generator: Generator
-) -> Iterator[Surface]:
+def _panes(length: float, opening: tuple[float, float, float], generator: Generator) -> Surfaces:
     """Glass in an opening, frames between the panes, blinds or a curtain before some of them."""
     wide, low, high = opening
     x = np.linspace((length - wide) / 2, (length + wide) / 2, 2 + int(wide / 1.4))
@@ -214,7 +207,7 @@ def _panes(
             yield made([bars(ends, 0.01)], generator)
 
 
-def _on_the_wall(length: float, height: float, generator: Generator) -> Iterator[Surface]:
+def _on_the_wall(length: float, height: float, generator: Generator) -> Surfaces:
     """Pictures, boards, pipes, a radiator, coats on hooks, cables; the room lies at positive y."""
     for _ in range(generator.integers(0, 4)):
         x, z = generator.uniform(0, length), generator.uniform(0.8, 2.0)

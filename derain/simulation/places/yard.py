@@ -1,11 +1,9 @@
 """A yard or building site, all of ragged things: nets, scaffolds, rubble, scrub, mesh, logs."""
 
-from collections.abc import Iterator
-
 import numpy as np
 from numpy.random import Generator
 
-from derain.simulation.objects import Piece, Surface, of_size
+from derain.simulation.objects import Piece, Surface, Surfaces, of_size
 from derain.simulation.places import ground, openwork, placing, plants, walls
 from derain.simulation.track import Track
 
@@ -30,14 +28,14 @@ def lay_out_yard(generator: Generator) -> Track:
     return placing.assemble(floor, standing, uneven, generator, over)
 
 
-def _ground(winter: bool, generator: Generator) -> Iterator[Surface]:
+def _ground(winter: bool, generator: Generator) -> Surfaces:
     kinds = [ground.GRAVEL, ground.TRACK, ground.SNOW if winter else ground.MEADOW, ground.FIELD]
     chosen = [kinds[which] for which in generator.permutation(len(kinds))[:2]]
     patches = ground.Relief.draw(1, generator)
     return ground.ground_mesh(chosen, lambda x, y: (patches(x, y) > 0).astype(np.int64), generator)
 
 
-def _heaps(winter: bool, generator: Generator) -> Iterator[Surface]:
+def _heaps(winter: bool, generator: Generator) -> Surfaces:
     def mound(generator: Generator) -> Surface:
         length = generator.uniform(2, 8)
         return ground.bank(length, generator, snow=winter and generator.random() < 0.7)
@@ -47,7 +45,7 @@ def _heaps(winter: bool, generator: Generator) -> Iterator[Surface]:
     yield from placing.scatter(placing.shuffled(makes, generator), places, generator)
 
 
-def _lines(winter: bool, generator: Generator) -> Iterator[Surface]:
+def _lines(winter: bool, generator: Generator) -> Surfaces:
     """Fences, nets, scaffolds, hedges and walls, each a line somewhere, turned anyhow."""
     kinds: list[Piece] = [
         openwork.chain_link,
@@ -68,7 +66,7 @@ def _lines(winter: bool, generator: Generator) -> Iterator[Surface]:
         yield from placing.place(line, x, y, across)
 
 
-def _grass(generator: Generator) -> Iterator[Surface]:
+def _grass(generator: Generator) -> Surfaces:
     for _ in range(generator.integers(1, 4)):
         count = int(generator.integers(100, 900))
         distance = placing.CLEARANCE + generator.exponential(generator.uniform(3, 9), count)
@@ -77,7 +75,7 @@ def _grass(generator: Generator) -> Iterator[Surface]:
         yield plants.grass(places, generator)
 
 
-def _cables(generator: Generator) -> Iterator[Surface]:
+def _cables(generator: Generator) -> Surfaces:
     for _ in range(generator.integers(0, 6)):
         height, x = generator.uniform(3, 7), generator.uniform(-10, 30)
         start, end = np.array([x, -25, height]), np.array([x + generator.normal(0, 15), 25, height])
