@@ -12,6 +12,9 @@ from derain.files.names import scan_suffix
 from derain.files.text import encode
 from derain.scan import Array, Float32s, Scan, named, to_float32
 
+# Columns of a file by their names, N rows each.
+Columns = Mapping[str, Array]
+
 # KITTI, SemanticKITTI, WADS and REHEARSE-3D.
 DEFAULT_COLUMNS = ("x", "y", "z", "intensity")
 
@@ -44,10 +47,7 @@ def name_columns(path: Path, columns: Sequence[Array], names: Sequence[str]) -> 
 
 
 def scan_of(
-    path: Path,
-    fields: Mapping[str, Array],
-    shape: tuple[int, int] | None = None,
-    header: object = None,
+    path: Path, fields: Columns, shape: tuple[int, int] | None = None, header: object = None
 ) -> Scan:
     """Makes a Scan of a file's columns.
 
@@ -93,7 +93,7 @@ def intensity_name(subject: str | Path, names: Iterable[str]) -> str | None:
     return next((name for name in found if name is not None), None)
 
 
-def _numbers(fields: Mapping[str, Array], *axes: int, kinds: str = "iuf") -> dict[str, Array]:
+def _numbers(fields: Columns, *axes: int, kinds: str = "iuf") -> dict[str, Array]:
     """The columns that hold numbers and have one of these numbers of axes."""
     return {
         name: column
@@ -102,7 +102,7 @@ def _numbers(fields: Mapping[str, Array], *axes: int, kinds: str = "iuf") -> dic
     }
 
 
-def _coordinates(path: Path, fields: Mapping[str, Array]) -> Float32s:
+def _coordinates(path: Path, fields: Columns) -> Float32s:
     """Coordinates among a file's columns, float32 (N, 3)."""
     table = named(_numbers(fields, 1, 2), "xyz", path)
     if table is not None:
@@ -119,7 +119,7 @@ def _coordinates(path: Path, fields: Mapping[str, Array]) -> Float32s:
     return np.stack([to_float32(axis) for axis in axes], axis=1)
 
 
-def _refuse_unusable(path: Path, fields: Mapping[str, Array]) -> None:
+def _refuse_unusable(path: Path, fields: Columns) -> None:
     """Refuses coordinates that are there by their names, but not as numbers of each point."""
     usable = _numbers(fields, 1)
     columns = {name: named(fields, name, path) for name in ("xyz", *"xyz")}
@@ -203,7 +203,7 @@ def no_place(path: Path, name: str, column: Array, remedy: str = "Write .npz.") 
     return InputError(path, reason, remedy)
 
 
-def records(columns: Mapping[str, Array], row: np.dtype[Any]) -> Array:
+def records(columns: Columns, row: np.dtype[Any]) -> Array:
     """Columns of N rows each as one structured array (N,).
 
     Args:

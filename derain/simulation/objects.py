@@ -51,17 +51,18 @@ class Surface:
 # Surfaces as they are made, one after the other.
 Surfaces = Iterator[Surface]
 
-# Something made at the origin, of one surface or of several.
-Make = Callable[[Generator], Surface | Iterable[Surface]]
+# Something of one surface or of several, and what makes it at the origin.
+Thing = Surface | Iterable[Surface]
+Make = Callable[[Generator], Thing]
 
 # Makers of objects, and their shares in a random choice.
 Options = Iterable[tuple[Make, float]]
 
 # Made piece by piece along a line, by the length of a piece in metres.
-Piece = Callable[[float, Generator], Surface | Iterable[Surface]]
+Piece = Callable[[float, Generator], Thing]
 
 
-def of_size(make: Callable[..., Surface | Iterable[Surface]], *sizes: Span) -> Make:
+def of_size(make: Callable[..., Thing], *sizes: Span) -> Make:
     """Makes things whose sizes, in metres, are each uniform between two values."""
     return lambda generator: make(*(generator.uniform(*size) for size in sizes), generator)
 

@@ -18,6 +18,10 @@ USUAL_CHANNELS = ("x", "y", "z", "intensity", "range")
 # Far more than any sensor measures of a point.
 MOST_CHANNELS = 64
 
+# Names of input channels in their order, and replacements of values that a scan lacks, by channel.
+Channels = tuple[str, ...]
+FillValues = Mapping[str, float]
+
 UNITS = {
     **dict.fromkeys(("x", "y", "z", "range"), "m"),
     "doppler": "m/s",
@@ -53,7 +57,7 @@ def channel_values(scan: Scan, rows: Ints, channels: Sequence[str]) -> Float32s:
 
 
 def filled_values(
-    scan: Scan, rows: Ints, channels: Sequence[str], fill_value: Mapping[str, float]
+    scan: Scan, rows: Ints, channels: Sequence[str], fill_value: FillValues
 ) -> Float32s:
     """Values of channels at some points of a scan, with replacements for missing ones.
 
@@ -77,7 +81,7 @@ def filled_values(
 
 
 def channel_image(
-    scan: Scan, winner: Ints, channels: Sequence[str], fill_value: Mapping[str, float]
+    scan: Scan, winner: Ints, channels: Sequence[str], fill_value: FillValues
 ) -> Float32s:
     """Values of channels in the pixels of an image, with replacements for missing ones.
 

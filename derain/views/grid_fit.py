@@ -11,8 +11,7 @@ from derain.errors import InputError
 from derain.scan import Scan
 from derain.views import scan_pattern
 from derain.views.range_image import RangeView
-from derain.views.scan_pattern import Extent
-from derain.views.spherical_grid import ALL_AROUND, SphericalGrid
+from derain.views.spherical_grid import ALL_AROUND, Extent, SphericalGrid
 
 # Networks halve an image four times; columns come in 64 for the processor's sake.
 ROW_MULTIPLE = 16

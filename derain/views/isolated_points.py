@@ -13,6 +13,7 @@ import numpy as np
 
 from derain.files.documents import Entry
 from derain.scan import Array, Float32s, Floats, Ints, Scan
+from derain.views.channels import Channels, FillValues
 from derain.views.intensity_rank import INTENSITY_RANKS, edges_reached, intensity_rank
 from derain.views.merged_points import are_one_return, merged_points
 from derain.views.morton import distinct_rows
@@ -113,9 +114,7 @@ class IsolatedPointView(View):
     threads: int = 0
 
     @classmethod
-    def of(
-        cls, entry: Entry, channels: tuple[str, ...], fill_value: Mapping[str, float], threads: int
-    ) -> Self:
+    def of(cls, entry: Entry, channels: Channels, fill_value: FillValues, threads: int) -> Self:
         """The view that a Spec describes by its ``kind`` and its ``neighbours``.
 
         Raises:

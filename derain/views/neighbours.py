@@ -10,7 +10,7 @@ import numpy as np
 from derain.files.documents import Entry
 from derain.scan import Array, Bools, Float32s, Ints, Scan
 from derain.views.candidates import Candidates
-from derain.views.channels import filled_values
+from derain.views.channels import Channels, FillValues, filled_values
 from derain.views.morton import distinct_rows
 from derain.views.neighbour_search import NeighbourSearch
 from derain.views.view import VIEWS, BackProjection, View, ViewedScan
@@ -137,15 +137,13 @@ class NeighbourView(View):
     """
 
     neighbours: int = 9
-    channels: tuple[str, ...] = ("x", "y", "z", "intensity")
-    fill_value: Mapping[str, float] = field(default_factory=dict)
+    channels: Channels = ("x", "y", "z", "intensity")
+    fill_value: FillValues = field(default_factory=dict)
     threads: int = 0
     candidates: Candidates | None = None
 
     @classmethod
-    def of(
-        cls, entry: Entry, channels: tuple[str, ...], fill_value: Mapping[str, float], threads: int
-    ) -> Self:
+    def of(cls, entry: Entry, channels: Channels, fill_value: FillValues, threads: int) -> Self:
         """The view that a Spec describes by its ``kind`` and its ``neighbours``.
 
         Raises:

@@ -1,7 +1,7 @@
 """The range view: a scan as the image that the sensor saw."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Self
@@ -14,8 +14,8 @@ from derain.files.documents import Entry
 from derain.scan import Array, Bools, Float32s, Ints, Scan
 from derain.views.back_projection import BACK_PROJECTIONS, ProjectedPoints
 from derain.views.candidates import Candidates
-from derain.views.channels import channel_image
-from derain.views.spherical_grid import SphericalGrid, grid_at
+from derain.views.channels import Channels, FillValues, channel_image
+from derain.views.spherical_grid import Extent, SphericalGrid, grid_at
 from derain.views.view import IGNORED, VIEWS, BackProjection, View, ViewedScan
 
 # What a pixel shows. Taken as one integer, what is nearer is less, and of equally near points the
@@ -154,9 +154,9 @@ class RangeView(View):
     """
 
     grid: SphericalGrid
-    channels: tuple[str, ...] = ("range", "x", "y", "z", "intensity")
+    channels: Channels = ("range", "x", "y", "z", "intensity")
     back_projection: str = "nearest range"
-    fill_value: Mapping[str, float] = field(default_factory=dict)
+    fill_value: FillValues = field(default_factory=dict)
     candidates: Candidates | None = None
 
     def __post_init__(self) -> None:
@@ -166,9 +166,7 @@ class RangeView(View):
             raise InputError("back_projection", reason, remedy)
 
     @classmethod
-    def of(
-        cls, entry: Entry, channels: tuple[str, ...], fill_value: Mapping[str, float], threads: int
-    ) -> Self:
+    def of(cls, entry: Entry, channels: Channels, fill_value: FillValues, threads: int) -> Self:
         """The view that a Spec describes by its ``kind``, ``grid`` and ``way_back``.
 
         It uses one thread, even if more are permitted.
@@ -185,7 +183,7 @@ class RangeView(View):
         return {"kind": self.NAME, "grid": self.grid.as_dict(), "way_back": self.back_projection}
 
     @property
-    def azimuth(self) -> tuple[float, float]:
+    def azimuth(self) -> Extent:
         """Its field of view: the grid's right and left bound, degrees counter-clockwise from x."""
         return self.grid.azimuth
 

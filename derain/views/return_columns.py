@@ -1,10 +1,10 @@
 """Returns by a file's own columns: which is the first of its ray, and which follow."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from derain.files.columns import Columns
 from derain.scan import LARGEST_COORDINATE, Array, Bools, Ints, Scan
 
 # Returns nearer to each other than this are of one surface, metres: the sensor split its echo.
@@ -63,9 +63,6 @@ def stated_returns(scan: Scan) -> StatedReturns | None:
         if column.ndim == 1 and column.dtype.kind in "iuf"
     }
     return next((stated for read in _READERS if (stated := read(scan, columns))), None)
-
-
-Columns = Mapping[str, Array]
 
 
 def _from_numbers(scan: Scan, columns: Columns) -> StatedReturns | None:

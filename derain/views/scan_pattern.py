@@ -7,7 +7,7 @@ import numpy as np
 
 from derain.scan import Floats, Ints, Scan
 from derain.views.directions import directions
-from derain.views.spherical_grid import ALL_AROUND, FULL_CIRCLE
+from derain.views.spherical_grid import ALL_AROUND, FULL_CIRCLE, Extent
 
 # A degree belongs to the field of view, and a cluster to the beams, if it holds at least this
 # share of what the degree or cluster of a typical return holds. The rest are outliers.
@@ -31,9 +31,6 @@ IN_CLUSTERS = 0.99
 
 # Rows of an organised scan are beams if this share of the returns is nearest to its own row.
 IN_OWN_ROW = 0.9
-
-# First and last angle of a part of a circle, degrees.
-Extent = tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)

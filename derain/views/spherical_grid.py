@@ -15,6 +15,9 @@ from derain.scan import Float32s, Floats, Ints
 from derain.views.direction_table import OUTSIDE, UNSURE_BELOW, DirectionTable
 from derain.views.directions import directions
 
+# First and last angle of a part of a circle, degrees.
+Extent = tuple[float, float]
+
 FULL_CIRCLE = 360.0
 ALL_AROUND = (-180.0, 180.0)
 
@@ -64,7 +67,7 @@ class SphericalGrid:
     """
 
     columns: int
-    azimuth: tuple[float, float]
+    azimuth: Extent
     edges: tuple[float, ...]
 
     def __post_init__(self) -> None:
@@ -84,11 +87,7 @@ class SphericalGrid:
 
     @classmethod
     def even(
-        cls,
-        rows: int,
-        columns: int,
-        inclination: tuple[float, float],
-        azimuth: tuple[float, float] = ALL_AROUND,
+        cls, rows: int, columns: int, inclination: Extent, azimuth: Extent = ALL_AROUND
     ) -> Self:
         """A grid with rows of equal height.
 
@@ -106,9 +105,7 @@ class SphericalGrid:
         return cls(columns, azimuth, tuple(edges.tolist()))
 
     @classmethod
-    def of_beams(
-        cls, beams: Sequence[float], columns: int, azimuth: tuple[float, float] = ALL_AROUND
-    ) -> Self:
+    def of_beams(cls, beams: Sequence[float], columns: int, azimuth: Extent = ALL_AROUND) -> Self:
         """A grid with one row a beam: borders midway between beams, half a step beyond the last.
 
         Args:

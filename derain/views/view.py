@@ -9,7 +9,8 @@ from derain.files.documents import Entry
 from derain.scan import Array, Bools, Float32s, Ints, Scan
 from derain.system.registry import Registry
 from derain.views.candidates import Candidates
-from derain.views.spherical_grid import ALL_AROUND
+from derain.views.channels import Channels, FillValues
+from derain.views.spherical_grid import ALL_AROUND, Extent
 from derain.views.window import Window, WindowOfScans
 
 # In a target: nothing is there to be judged, such as in a pixel without a return.
@@ -98,9 +99,7 @@ class View(ABC):
 
     @classmethod
     @abstractmethod
-    def of(
-        cls, entry: Entry, channels: tuple[str, ...], fill_value: Mapping[str, float], threads: int
-    ) -> Self:
+    def of(cls, entry: Entry, channels: Channels, fill_value: FillValues, threads: int) -> Self:
         """Reads back what :meth:`as_dict` gave. It is not trusted.
 
         Args:
@@ -118,7 +117,7 @@ class View(ABC):
         """Its part of a Spec, JSON-able: its name as ``kind``, and what is its own."""
 
     @property
-    def azimuth(self) -> tuple[float, float]:
+    def azimuth(self) -> Extent:
         """Its field of view: right and left bound, degrees counter-clockwise from x.
 
         By default everything around.

@@ -6,7 +6,7 @@ record of user id "laszip encoded" and the layered chunks of point formats 6 to 
 
 import io
 import struct
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.files.columns import columns_of, no_place, scan_of
+from derain.files.columns import Columns, columns_of, no_place, scan_of
 from derain.files.content import Content
 from derain.files.format import FORMATS, Format
 from derain.files.names import scan_suffix
@@ -143,9 +143,7 @@ def _panics_as_errors() -> Iterator[None]:
         raise ValueError(str(error)) from error
 
 
-def _with_dimensions(
-    laspy: ModuleType, path: Path, header: Any, columns: Mapping[str, Array]
-) -> Any:
+def _with_dimensions(laspy: ModuleType, path: Path, header: Any, columns: Columns) -> Any:
     """The header with room for further columns; itself if there are none."""
     if not columns:
         return header

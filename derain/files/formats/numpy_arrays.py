@@ -3,7 +3,7 @@
 import io
 import math
 import zipfile
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.lib import format as npy_format
 
 from derain.errors import InputError
-from derain.files.columns import columns_of, intensity_name, name_columns, records, scan_of
+from derain.files.columns import Columns, columns_of, intensity_name, name_columns, records, scan_of
 from derain.files.content import Content, check_columns
 from derain.files.format import FORMATS, Format
 from derain.scan import Array, Scan, has_points_as_columns, named
@@ -45,7 +45,7 @@ class NpzHeader:
         as_columns: Names of the columns that the file holds as arrays (N, 1).
     """
 
-    constants: Mapping[str, Array]
+    constants: Columns
     table: str | None = None
     columns: tuple[str, ...] = ()
     structured: bool = False
@@ -210,7 +210,7 @@ def _fields_as_columns(array: Array) -> frozenset[str]:
     return frozenset(name for name in names if array.dtype[name].shape == (1,))
 
 
-def _as_in_file(columns: Mapping[str, Array], as_columns: Collection[str]) -> dict[str, Array]:
+def _as_in_file(columns: Columns, as_columns: Collection[str]) -> dict[str, Array]:
     """Columns of a scan, those that the file holds as (N, 1) in that shape."""
     return {
         name: column[:, np.newaxis] if name in as_columns and column.ndim == 1 else column
@@ -218,7 +218,7 @@ def _as_in_file(columns: Mapping[str, Array], as_columns: Collection[str]) -> di
     }
 
 
-def _table(columns: Mapping[str, Array], structured: bool) -> Array:
+def _table(columns: Columns, structured: bool) -> Array:
     """Columns as one array: numbers (N, C) if all are of one dtype, else structured (N,)."""
     dtypes = {column.dtype for column in columns.values()}
     flat = all(column.ndim == 1 for column in columns.values())
@@ -247,7 +247,7 @@ def _columns_of_table(path: Path, array: Array, columns: Sequence[str]) -> dict[
     return name_columns(path, list(array.reshape(points, array.shape[-1]).T), columns)
 
 
-def _name_of_table(path: Path, arrays: Mapping[str, Array]) -> str | None:
+def _name_of_table(path: Path, arrays: Columns) -> str | None:
     """Name of the array that holds all columns; None where each column has its own."""
     names = {name: name for name in arrays}
     if named(names, "xyz", path) or named(names, "x", path):
@@ -259,7 +259,7 @@ def _grid_of_table(array: Array) -> tuple[int, ...]:
     return array.shape if array.dtype.names else array.shape[:-1]
 
 
-def _grid(path: Path, arrays: Mapping[str, Array]) -> tuple[int, ...]:
+def _grid(path: Path, arrays: Columns) -> tuple[int, ...]:
     """Shape of the arrays that hold one value per point."""
     table, column = named(arrays, "xyz", path), named(arrays, "x", path)
     if table is not None:
@@ -271,7 +271,7 @@ def _grid(path: Path, arrays: Mapping[str, Array]) -> tuple[int, ...]:
 
 
 def _refuse_other_points(
-    path: Path, grid: tuple[int, ...], fields: Mapping[str, Array], constants: Mapping[str, Array]
+    path: Path, grid: tuple[int, ...], fields: Columns, constants: Columns
 ) -> None:
     """Refuses a constant that has the name of a column that is read.
 

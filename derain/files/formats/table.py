@@ -7,7 +7,7 @@ RFC 4180.
 import csv
 import io
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import chain, islice
@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from derain.files.columns import columns_of, name_columns, no_place, scan_of
+from derain.files.columns import Columns, columns_of, name_columns, no_place, scan_of
 from derain.files.content import Content, check_columns
 from derain.files.format import FORMATS, Format
 from derain.files.names import scan_suffix
@@ -59,14 +59,14 @@ class TableHeader:
     text: bytes
     begin: int
     spans: Ints
-    columns: Mapping[str, Array]
+    columns: Columns
 
     def take(self, rows: Array) -> "TableHeader":
         """The table of some of the points only."""
         columns = {name: column[rows] for name, column in self.columns.items()}
         return replace(self, spans=self.spans[rows], columns=columns)
 
-    def holds(self, columns: Mapping[str, Array]) -> bool:
+    def holds(self, columns: Columns) -> bool:
         """True if the lines hold just these columns, with these numbers."""
         return tuple(columns) == tuple(self.columns) and all(
             np.array_equal(ours, theirs, equal_nan=True)

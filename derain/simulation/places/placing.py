@@ -10,7 +10,7 @@ from numpy.random import Generator
 from derain.scan import Floats
 from derain.simulation import objects, shapes
 from derain.simulation.drawing import Span, log_uniform
-from derain.simulation.objects import Make, Options, Piece, Surface, Surfaces, of_size
+from derain.simulation.objects import Make, Options, Piece, Surface, Surfaces, Thing, of_size
 from derain.simulation.places import ground, openwork, plants, road_users
 from derain.simulation.places.ground import Relief
 from derain.simulation.shapes import Place
@@ -83,11 +83,9 @@ def shuffled(makes: Iterable[Make], generator: Generator) -> list[Make]:
     return [ordered[which] for which in generator.permutation(len(ordered))]
 
 
-def place(
-    things: Surface | Iterable[Surface], x: float, y: float, heading: float = 0.0
-) -> Surfaces:
+def place(thing: Thing, x: float, y: float, heading: float = 0.0) -> Surfaces:
     """A thing turned by a heading in radians, then moved to (x, y)."""
-    for surface in [things] if isinstance(things, Surface) else things:
+    for surface in [thing] if isinstance(thing, Surface) else thing:
         yield surface.placed(x, y, heading)
 
 
