@@ -188,9 +188,8 @@ def _in_brief(facts: dict[str, Any]) -> dict[str, Any]:
     match facts:
         case {"spec": {"training": dict(training)}}:
             counts = {kind: f"{len(names):,}" for kind, names in training.items()}
-            candidates = candidates_at(
-                Entry("model", "candidates", facts["spec"].get("candidates"))
-            )
+            entry = Entry("model", "candidates", facts["spec"].get("candidates"))
+            candidates = candidates_at(entry)
             brief = {"training": counts, "candidates": candidates or "every point"}
             return {**facts, "spec": {**facts["spec"], **brief}}
     return facts

@@ -132,10 +132,9 @@ def facts_of_folder(
     folders = None if layout is None else [layout.scans, layout.labels]
     card, rests_on = (card, "--card") if card else _card(folder, layout)
     sequences = find_sequences(folder, layout, arguments.columns, layouts)
-    rates = sorted(
-        {sequence.rain_rate for sequence in sequences}, key=lambda rate: (rate is None, rate or 0)
-    )
-    by_rain_rate = {rate: Contents() for rate in rates}
+    rates = {sequence.rain_rate for sequence in sequences}
+    ascending = sorted(rates, key=lambda rate: (rate is None, rate or 0))
+    by_rain_rate = {rate: Contents() for rate in ascending}
     # In this process units are of one scan, so that a progress bar counts scans.
     block = 1 if records is None and executor is None else division.block
     frames: list[Frame] = []

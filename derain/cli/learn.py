@@ -125,9 +125,8 @@ def _write_playback(config: LearnConfig, out: Path) -> None:
 
     data = Taught(str(config.taught))
     held_out = data.frames("validation")
-    frames = sorted(
-        [*data.frames("train"), *held_out], key=lambda frame: (frame.sequence, frame.number)
-    )
+    every = [*data.frames("train"), *held_out]
+    frames = sorted(every, key=lambda frame: (frame.sequence, frame.number))
     shown = evenly_spaced(range(len(frames)), MOST_SHOWN)
     selection = Selection(Frames(frames), shown, frozenset(frame.key for frame in held_out))
     methods: dict[str, Method] = {"student": Derainer(config.out)}

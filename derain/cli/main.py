@@ -156,15 +156,12 @@ def _run(arguments: list[str]) -> int:
 
 def _parser(command: str | None) -> Parser:
     """The parser, with the arguments of one command; it only lists the others."""
-    parser = Parser(
-        "derain", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    as_written = argparse.RawDescriptionHelpFormatter
+    parser = Parser("derain", description=__doc__, formatter_class=as_written)
     parser.add_argument("--version", action="version", version=f"derain {__version__}")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, summary in SUMMARIES.items():
-        of_command = subparsers.add_parser(
-            name, help=summary, formatter_class=argparse.RawDescriptionHelpFormatter
-        )
+        of_command = subparsers.add_parser(name, help=summary, formatter_class=as_written)
         if name == command:
             module = module_of(name)
             of_command.description = module.__doc__

@@ -87,9 +87,8 @@ RARE = (
 
 def add_arguments(parser: Parser) -> None:
     """Declares the command's arguments."""
-    add_method_and_scans(
-        parser, help="scans, folders of scans or of recordings, data sets, bags, or URLs"
-    )
+    text = "scans, folders of scans or of recordings, data sets, bags, or URLs"
+    add_method_and_scans(parser, help=text)
     parser.add_argument("--out", type=place_of, required=True, help="folder or URL to write to")
     options.add_json(parser)
     options.add_columns(parser)
@@ -251,9 +250,8 @@ class _Printer(CleaningObserver):
         if len(report.scans) > 1:
             print(report, file=self._stream, flush=True)
         if self._example.rain:
-            print_lines(
-                f"{self._example} Look at it: derain view example --out figure.png", self._stream
-            )
+            look = "Look at it: derain view example --out figure.png"
+            print_lines(f"{self._example} {look}", self._stream)
 
     def noticed(self, scan: str, odd: list[ScanIssue]) -> None:
         """Warns of a scan's issues."""

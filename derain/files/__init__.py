@@ -90,9 +90,8 @@ def write_scan(path: Path | str, scan: Scan | Array) -> None:
     content = format_of(path).encode(path, scan)
     if isinstance(scan.header, PartialHeader) and scan.header.left_out:
         parts = ", ".join(scan.header.left_out)
-        warnings.warn(
-            f"the written copy of {scan.name} lacks its {parts}", ScanWarning, stacklevel=2
-        )
+        lack = f"the written copy of {scan.name} lacks its {parts}"
+        warnings.warn(lack, ScanWarning, stacklevel=2)
     with replacing(path) as temporary:
         temporary.write_bytes(compressed(content) if is_compressed(path) else content)
 

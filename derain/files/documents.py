@@ -143,9 +143,8 @@ class Entry:
 
     def fault(self, reason: str, remedy: str) -> InputError:
         """The error of a wrong value here."""
-        return InputError(
-            f"{self.source}: {short(self.key)}" if self.key else self.source, reason, remedy
-        )
+        place = f"{self.source}: {short(self.key)}" if self.key else self.source
+        return InputError(place, reason, remedy)
 
     def members(self) -> dict[str, "Entry"]:
         """The values of a mapping by their keys, which must be text."""

@@ -121,9 +121,8 @@ def _curves(labels: Labels | None) -> views.Horizontal:
 
 
 def _curve(origin: str, name: str, *, legend: bool) -> views.TimeSeriesView:
-    return views.TimeSeriesView(
-        origin=origin, name=name, plot_legend=views.PlotLegend(visible=legend)
-    )
+    shown = views.PlotLegend(visible=legend)
+    return views.TimeSeriesView(origin=origin, name=name, plot_legend=shown)
 
 
 def write_static(

@@ -139,9 +139,8 @@ def show_comparison(scan: Scan, predicted: Mapping[str, Bools], rain: Bools | No
     seen = scan.valid
     for name, called_rain in predicted.items():
         outcome = outcomes(called_rain, called_rain if rain is None else rain)
-        cloud = open3d.geometry.PointCloud(
-            open3d.utility.Vector3dVector(scan.xyz[seen].astype(np.float64))
-        )
+        points = open3d.utility.Vector3dVector(scan.xyz[seen].astype(np.float64))
+        cloud = open3d.geometry.PointCloud(points)
         cloud.colors = open3d.utility.Vector3dVector(colours[outcome[seen]])
         window = open3d.visualization.Visualizer()
         if not window.create_window(window_name=f"{scan.name}: {name}"):

@@ -105,9 +105,8 @@ class _Side:
         if len(rain) < FEWEST:
             return math.inf
         tail = max(outside, 1 / len(rain))
-        before, edge = np.quantile(
-            rain, [max(1 - 10 * tail, 0.5), 1 - tail], method="higher"
-        ).astype(float)
+        shares = [max(1 - 10 * tail, 0.5), 1 - tail]
+        before, edge = np.quantile(rain, shares, method="higher").astype(float)
         return _rounded_up(edge + (edge - before) * (1 + math.log10(tail / outside)))
 
     def leaves_out(self, limit: float) -> Bools:

@@ -98,9 +98,8 @@ def narrower(some: Iterable[Bound], others: Iterable[Bound]) -> tuple[Bound, ...
         bound = by_channel.get(other.channel, other)
         least = [limit for limit in (bound.least, other.least) if limit is not None]
         most = [limit for limit in (bound.most, other.most) if limit is not None]
-        by_channel[other.channel] = Bound(
-            other.channel, max(least, default=None), min(most, default=None)
-        )
+        both = Bound(other.channel, max(least, default=None), min(most, default=None))
+        by_channel[other.channel] = both
     return tuple(by_channel.values())
 
 

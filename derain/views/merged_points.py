@@ -34,9 +34,8 @@ def merged_points(
         Of each return the point of the lowest row, int64 (R,), in the order of the points; and the
         return that each point is, as a row of the former, int64 (M,).
     """
-    own, place_of_other = np.nonzero(
-        are_one_return(xyz, np.arange(len(xyz)), neighbours, distances)
-    )
+    one_return = are_one_return(xyz, np.arange(len(xyz)), neighbours, distances)
+    own, place_of_other = np.nonzero(one_return)
     other = neighbours[own, place_of_other + 1]
     by_row = np.argsort(rows)
     place = np.empty_like(by_row)

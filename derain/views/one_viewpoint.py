@@ -265,9 +265,8 @@ def crowding_far_off(rays: Rays) -> float:
     surface = np.floor(np.log(range_) / np.log(ONE_SURFACE))
     order = np.argsort(range_)
     first = order[np.append(True, np.diff(range_[order]) > 0)]
-    _, cell, points = np.unique(
-        (cells * 1000 + surface)[first], return_inverse=True, return_counts=True
-    )
+    occupied = (cells * 1000 + surface)[first]
+    _, cell, points = np.unique(occupied, return_inverse=True, return_counts=True)
     quarters = [part.mean() for part in np.array_split(points[cell], 4)]
     return float(max(quarters) / quarters[0])
 

@@ -84,10 +84,8 @@ def _from_las_bits(scan: Scan, columns: Columns) -> StatedReturns | None:
     # have three. Source: ASPRS, LAS Specification 1.4.
     width = 4 if "classification_flags" in columns else 3
     ones = (1 << width) - 1
-    number, count = bits & ones, bits >> width & ones
-    return _from_numbers_and_counts(
-        scan, "bit_fields", number.astype(np.int64), count.astype(np.int64)
-    )
+    bits = bits.astype(np.int64)
+    return _from_numbers_and_counts(scan, "bit_fields", bits & ones, bits >> width & ones)
 
 
 def _from_numbers_and_counts(

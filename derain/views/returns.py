@@ -128,9 +128,8 @@ def _returns_of_rows(
         stated: The returns by columns, for rows without a partner.
     """
     # The last value is that of position -1.
-    nearer, farther = (
-        np.append(values, False)[inverse] for values in (found.nearer, found.farther)
-    )
+    nearer = np.append(found.nearer, False)[inverse]
+    farther = np.append(found.farther, False)[inverse]
     partner_of_first = np.where(found.partner >= 0, first[found.partner], -1)
     partner = np.append(partner_of_first, -1)[inverse]
     if stated is None:

@@ -144,10 +144,8 @@ def outside_view(scan: Scan, judged: Bools, data: str) -> Iterator[ScanIssue]:
     valid = scan.valid
     outside = float((~judged[valid]).mean()) if valid.any() else 0.0
     if outside > MOST_OUTSIDE:
-        yield ScanIssue(
-            "points outside the grid",
-            f"{outside:.0%} of the points lie outside the grid of {data}, and stay",
-        )
+        detail = f"{outside:.0%} of the points lie outside the grid of {data}, and stay"
+        yield ScanIssue("points outside the grid", detail)
 
 
 def much_removed(share: float) -> Iterator[ScanIssue]:
@@ -174,10 +172,8 @@ def intensity_in_places(scan: Scan, judged: Bools) -> Iterator[ScanIssue]:
     lacking = scan.lacks_intensity
     if lacking.any():
         result = "judged without it" if judged[lacking].any() else "not judged, and stay"
-        yield ScanIssue(
-            "no intensity in places",
-            f"no possible intensity at {np.count_nonzero(lacking):,} points: they are {result}",
-        )
+        detail = f"no possible intensity at {np.count_nonzero(lacking):,} points: they are {result}"
+        yield ScanIssue("no intensity in places", detail)
 
 
 def no_points(scan: Scan) -> Iterator[ScanIssue]:
@@ -189,10 +185,8 @@ def no_points(scan: Scan) -> Iterator[ScanIssue]:
 def left_out(scan: Scan) -> Iterator[ScanIssue]:
     """Yields an issue if a scan's file has parts that are not written with the cleaned scan."""
     if isinstance(scan.header, PartialHeader) and scan.header.left_out:
-        yield ScanIssue(
-            "parts of the file that are not written",
-            f"the cleaned file is without its {', '.join(scan.header.left_out)}",
-        )
+        detail = f"the cleaned file is without its {', '.join(scan.header.left_out)}"
+        yield ScanIssue("parts of the file that are not written", detail)
 
 
 def _lack(scan: Scan) -> tuple[str, str]:

@@ -113,9 +113,8 @@ def azimuth_step(scans: Sequence[ReturnAngles], borders: Sequence[float]) -> flo
         scans: Angles of the returns of one or more scans of one sensor.
         borders: Inclinations between which the returns are of one beam, ascending, degrees.
     """
-    return _median_gap(
-        [(scan.azimuth, np.searchsorted(borders, scan.inclination)) for scan in scans]
-    )
+    slabs = [np.searchsorted(borders, scan.inclination) for scan in scans]
+    return _median_gap([scan.azimuth for scan in scans], slabs)
 
 
 def inclination_step(scans: Sequence[ReturnAngles], azimuth_step: float) -> float:
@@ -126,16 +125,16 @@ def inclination_step(scans: Sequence[ReturnAngles], azimuth_step: float) -> floa
         azimuth_step: Azimuth from one shot to the next, degrees.
     """
     # A little less than a step, or else evenly spaced shots could come to lie two in one slab.
-    slab = 0.95 * azimuth_step
-    return _median_gap(
-        [(scan.inclination, np.floor(scan.azimuth / slab).astype(np.int64)) for scan in scans]
-    )
+    width = 0.95 * azimuth_step
+    slabs = [np.floor(scan.azimuth / width).astype(np.int64) for scan in scans]
+    return _median_gap([scan.inclination for scan in scans], slabs)
 
 
-def _median_gap(scans: Sequence[tuple[Floats, Ints]]) -> float:
+def _median_gap(angles: Sequence[Floats], slabs: Sequence[Ints]) -> float:
     """Median gap between the angles that lie in one slab, of angles and slab numbers by scan."""
     # Slabs are laid end to end, farther apart than any two angles.
-    lines = [np.sort(slab * (2 * FULL_CIRCLE) + angle) for angle, slab in scans]
+    of_scans = zip(angles, slabs, strict=True)
+    lines = [np.sort(slab * (2 * FULL_CIRCLE) + angle) for angle, slab in of_scans]
     gaps = np.concatenate([np.diff(line) for line in lines])
     gaps = gaps[(gaps > FINEST_STEP) & (gaps < FULL_CIRCLE)]
     return float(np.median(gaps)) if len(gaps) else USUAL_STEP

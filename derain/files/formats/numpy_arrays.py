@@ -193,9 +193,8 @@ def _arrays(content: Content) -> dict[str, Array]:
     with zipfile.ZipFile(io.BytesIO(content.data)) as archive:
         for member in archive.infolist():
             if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-                raise ValueError(
-                    f"{member.filename} is compressed by a method that NumPy does not use"
-                )
+                reason = "is compressed by a method that NumPy does not use"
+                raise ValueError(f"{member.filename} {reason}")
             content.budget.reserve(member.file_size)
             with archive.open(member) as file:
                 # So many bytes, not all: what a member states is not what it may expand to.

@@ -197,9 +197,8 @@ def _columns_of(header: PcdHeader, data: bytes, budget: MemoryBudget) -> dict[st
 def _decompressed_columns(header: PcdHeader, data: bytes, budget: MemoryBudget) -> dict[str, Array]:
     """One column after the other, all of them compressed as one block."""
     compressed_size, size = np.frombuffer(data, "<u4", count=2).tolist()
-    named = replace(
-        header, columns=tuple(column for column in header.columns if column[0] != PADDING)
-    )
+    columns = tuple(column for column in header.columns if column[0] != PADDING)
+    named = replace(header, columns=columns)
     if size == header.points * named.row.itemsize:  # no padding in the data
         header = named
     points, rest = divmod(size, header.row.itemsize)

@@ -168,9 +168,8 @@ class Ply(Format):
             InputError: A file that is truncated or damaged, or has no vertices with coordinates.
         """
         header, table = _parse(content.data)
-        return scan_of(
-            content.path, {name: table[name] for name in table.dtype.names or ()}, header=header
-        )
+        fields = {name: table[name] for name in table.dtype.names or ()}
+        return scan_of(content.path, fields, header=header)
 
     def encode(self, path: Path, scan: Scan) -> bytes:
         """A scan's columns as vertices, encoded like the PLY it came from, else binary.

@@ -68,9 +68,7 @@ def lay_out_city(generator: Generator) -> Track:
 def _ground(section: Section, generator: Generator) -> Surfaces:
     surface = ground.COBBLES if generator.random() < 0.25 else ground.ASPHALT
     right, left = section.kerbs
-    return ground.ground_mesh(
-        [surface, ground.PAVING], lambda x, y: np.where((y > right) & (y < left), 0, 1), generator
-    )
+    return ground.ground_mesh([surface, ground.PAVING], ground.between(right, left), generator)
 
 
 def _houses(section: Section, generator: Generator) -> Surfaces:

@@ -38,9 +38,7 @@ def lay_out_garage(generator: Generator) -> Track:
         *_cages(hall, generator),
         *_under_the_ceiling(hall, generator),
     ]
-    floor = ground.ground_mesh(
-        [ground.CONCRETE], lambda x, y: np.zeros(np.shape(x), np.int64), generator
-    )
+    floor = ground.ground_mesh([ground.CONCRETE], ground.between(-np.inf, np.inf), generator)
     uneven = ground.Relief.draw(generator.uniform(0.003, 0.03), generator)
     length, width = hall.x[1] - hall.x[0], hall.y[1] - hall.y[0]
     rough = walls.rough_wall(length, width, generator, cell=0.6)

@@ -124,6 +124,11 @@ def ground_mesh(
         yield Surface(triangles[mine], each.label, np.clip(spots, 0.003, 1))
 
 
+def between(right: float, left: float) -> Callable[[Floats, Floats], Ints]:
+    """Kinds of the ground by place: 0 between two y, in metres, as of a road along x, else 1."""
+    return lambda x, y: np.where((y > right) & (y < left), 0, 1)
+
+
 def _rings() -> Floats:
     """Corners on rings, float64 (RINGS + 1, CORNERS + 1, 3); the first ring is a point."""
     radius = np.concatenate([[0.0], np.geomspace(*RADII, RINGS)])[:, None]

@@ -42,9 +42,7 @@ def lay_out_motorway(generator: Generator) -> Track:
 
 def _ground(right: float, left: float, generator: Generator) -> Surfaces:
     verge = [ground.MEADOW, ground.GRAVEL, ground.SNOW][generator.choice(3, p=[0.6, 0.25, 0.15])]
-    return ground.ground_mesh(
-        [ground.ASPHALT, verge], lambda x, y: np.where((y > right) & (y < left), 0, 1), generator
-    )
+    return ground.ground_mesh([ground.ASPHALT, verge], ground.between(right, left), generator)
 
 
 def _rails(lines: tuple[float, ...], generator: Generator) -> Surfaces:
