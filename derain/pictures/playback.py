@@ -127,11 +127,9 @@ class PlaybackWriter:
         colours = look.colours(scan)[scan.valid]
         self.file.log(entities.POINTS, rerun.Points3D(scan.xyz[scan.valid], colors=colours))
         if look.view is not None:
+            ranges, span = look.centimetres(look.view(scan)), (0, look.farthest * PER_METRE)
             image = rerun.DepthImage(
-                look.centimetres(look.view(scan)),
-                meter=PER_METRE,
-                colormap="grayscale",
-                depth_range=(0, look.farthest * PER_METRE),
+                ranges, meter=PER_METRE, colormap="grayscale", depth_range=span
             )
             self.file.log(entities.RANGES, image)
         if self.labels is not None:
