@@ -165,12 +165,10 @@ def _dry_reach(
     scans = (frame.read() for frame in frames)
     dry = dry_reach(ScanWeather.of(scan, np.zeros(len(scan), bool)) for scan in scans)
     if dry.at_least < min(warning.above, error.above):
-        raise InputError(
-            reference,
-            f"its reach is {dry}, and a dry scan has to reach {error.above:g} m, where the "
-            "error ends",
-            "Give dry scans of a wider place, or smaller numbers to --warning and --error.",
-        )
+        end = error.above
+        reason = f"its reach is {dry}, and a dry scan has to reach {end:g} m, where the error ends"
+        remedy = "Give dry scans of a wider place, or smaller numbers to --warning and --error."
+        raise InputError(reference, reason, remedy)
     if dry.at_least < max(warning.above, error.above):
         warn(
             f"{reference}: its reach is {dry}, less than {warning.above:g} m, where the "

@@ -66,12 +66,8 @@ def road_and_ground(half_width: float, generator: Generator) -> Surfaces:
 
 
 def _traffic(half_width: float, generator: Generator) -> Surfaces:
-    kinds = (
-        [objects.car] * generator.integers(1, 4)
-        + [objects.pedestrian] * generator.integers(1, 4)
-        + [objects.bike] * generator.integers(1, 3)
-        + [objects.target] * generator.integers(1, 4)
-    )
+    fewer_than = {objects.car: 4, objects.pedestrian: 4, objects.bike: 3, objects.target: 4}
+    kinds = [kind for kind, end in fewer_than.items() for _ in range(generator.integers(1, end))]
     # More places than things, and far enough apart that nothing stands inside a car.
     places = generator.permutation(np.arange(6.0, 66, 5))
     for kind, x in zip(kinds, places, strict=False):
