@@ -45,8 +45,14 @@ LONGEST = 2000.0
 
 # Attributes that the sensors of earlier manifests do not have.
 LATER_ATTRIBUTES = (
-    *("row_azimuths", "pattern", "prism_turns", "tilt", "defects"),
-    *("range_noise_growth", "weak_range_noise", "encoder_noise"),
+    "row_azimuths",
+    "pattern",
+    "prism_turns",
+    "tilt",
+    "defects",
+    "range_noise_growth",
+    "weak_range_noise",
+    "encoder_noise",
 )
 
 

@@ -110,8 +110,12 @@ class Neighbourhoods(ViewedPoints):
         """The inputs, each as long as the scan has points, neighbourhoods or candidates."""
         if self.candidates is None:
             return dict.fromkeys(("points", "distances", "neighbours"), "points")
-        of_neighbourhoods = dict.fromkeys(("distances", "neighbours"), "neighbourhoods")
-        return {"points": "points", **of_neighbourhoods, "candidates": "candidates"}
+        return {
+            "points": "points",
+            "distances": "neighbourhoods",
+            "neighbours": "neighbourhoods",
+            "candidates": "candidates",
+        }
 
     @property
     def size(self) -> int:

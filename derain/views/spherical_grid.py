@@ -234,9 +234,12 @@ def grid_at(entry: Entry) -> SphericalGrid:
 
 # What reads each part of a grid's description. No image has more rows or columns than pixels.
 _PARSERS: dict[str, Callable[[Entry], Any]] = {
-    **dict.fromkeys(("columns", "rows"), lambda entry: entry.whole(1, MOST_PIXELS)),
-    **dict.fromkeys(("azimuth", "inclination"), lambda entry: entry.numbers(2)),
-    **dict.fromkeys(("beams", "edges"), Entry.numbers),
+    "columns": lambda entry: entry.whole(1, MOST_PIXELS),
+    "rows": lambda entry: entry.whole(1, MOST_PIXELS),
+    "azimuth": lambda entry: entry.numbers(2),
+    "inclination": lambda entry: entry.numbers(2),
+    "beams": Entry.numbers,
+    "edges": Entry.numbers,
 }
 
 

@@ -60,9 +60,12 @@ class Binary(Format):
         value = _value_type(content.data[:HEAD], len(content.data), columns)
         row = np.dtype(value).itemsize * len(columns)
         if row == 0 or len(content.data) % row:
-            rows = f"whole rows of {row} bytes ({','.join(columns)})"
-            remedy = "Name the file's columns with --columns, e.g. --columns x,y,z,intensity,ring."
-            raise InputError(content.path, f"{len(content.data)} bytes are not {rows}", remedy)
+            raise InputError(
+                content.path,
+                f"{len(content.data)} bytes are not whole rows of {row} bytes "
+                f"({','.join(columns)})",
+                "Name the file's columns with --columns, e.g. --columns x,y,z,intensity,ring.",
+            )
         table = np.frombuffer(content.data, value).reshape(-1, len(columns))
         fields = name_columns(content.path, list(table.T), columns)
         scan = scan_of(content.path, fields, header=BinaryHeader(value))
@@ -105,8 +108,11 @@ class Binary(Format):
         table = np.empty((len(scan), len(columns)), header.value)
         for place, (name, column) in enumerate(columns.items()):
             if column.ndim != 1 or not np.can_cast(column.dtype, table.dtype):
-                loss = f"the column {name} ({column.dtype}) without loss"
-                raise InputError(path, f"{table.dtype} cannot hold {loss}", "Write .pcd or .npz.")
+                raise InputError(
+                    path,
+                    f"{table.dtype} cannot hold the column {name} ({column.dtype}) without loss",
+                    "Write .pcd or .npz.",
+                )
             table[:, place] = column
         return table.tobytes()
 

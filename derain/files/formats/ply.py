@@ -245,9 +245,10 @@ def _parse_header(content: bytes) -> tuple[str, tuple[str, ...], list[Element], 
                 elements.append(Element(name, int(count), []))
             case ["property", kind, name] if kind in _KINDS and elements:
                 elements[-1].properties.append(Property(name, _KINDS[kind]))
-            case ["property", "list", length, kind, name] if elements and {length, kind} <= {
-                *_KINDS
-            }:
+            case ["property", "list", length, kind, name] if {
+                length,
+                kind,
+            } <= _KINDS.keys() and elements:
                 elements[-1].properties.append(Property(name, _KINDS[kind], _KINDS[length]))
             case _:
                 raise ValueError(f"'{line}' in the header")

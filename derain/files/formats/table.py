@@ -233,8 +233,9 @@ def _parse_lines(
             raise ValueError(f"after line {chunk[0].number}, quotes run over several lines")
         for line, row in zip(chunk, rows, strict=True):
             if len(row) != len(titles):
-                reason = f"has {len(row)} values for {len(titles)} columns"
-                raise ValueError(f"line {line.number} {reason}")
+                raise ValueError(
+                    f"line {line.number} has {len(row)} values for {len(titles)} columns"
+                )
         for title, column, texts in zip(titles, columns, zip(*rows, strict=True), strict=True):
             try:
                 column.append(_numbers(texts))
