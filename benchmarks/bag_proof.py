@@ -17,7 +17,6 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.recorded_bags import (
     IMU,
@@ -35,7 +34,7 @@ from benchmarks.recorded_bags import (
 from benchmarks.turns import milliseconds_in_turns
 from derain.cli.main import main as derain
 from derain.files import read_scan
-from derain.scan import Bools
+from derain.scan import Array, Bools
 from derain.sources.folders import named_frames
 
 
@@ -106,13 +105,13 @@ def _prove(storage: Storage, bag: Path, made: Path, masks: Sequence[Bools]) -> b
     return all(findings.values())
 
 
-def _left(message: bytes, storage: Storage) -> NDArray[Any]:
+def _left(message: bytes, storage: Storage) -> Array:
     """The points of a message, as the library reads it: rows of bytes."""
     ros = Ros(storage) if storage not in _ROS else _ROS[storage]
     _ROS[storage] = ros
     read = ros.store.deserialize_ros1 if ros.is_ros1 else ros.store.deserialize_cdr
     cloud = read(message, "sensor_msgs/msg/PointCloud2")
-    points: NDArray[Any] = np.asarray(cloud.data).reshape(-1, cloud.point_step)
+    points: Array = np.asarray(cloud.data).reshape(-1, cloud.point_step)
     return points
 
 

@@ -20,7 +20,6 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from benchmarks.batchnorm_memory import remembered_intensity
 from derain.cards.card import load_card
@@ -33,7 +32,7 @@ from derain.evaluation.text_tables import markdown_table, number_text
 from derain.files import read_scan
 from derain.models.outdet import OutDet
 from derain.models.published import read_state_dict
-from derain.scan import Bools, Floats, Scan
+from derain.scan import Bools, Float32s, Floats, Scan
 from derain.views.probability import probability_of_rain
 
 Method = Callable[[Scan], Bools]
@@ -117,7 +116,7 @@ def _truths(data: Simulated) -> Iterator[tuple[Scan, Bools]]:
         yield scan, CARD.rain_of(scan)
 
 
-def _intensity(scan: Scan) -> NDArray[np.float32]:
+def _intensity(scan: Scan) -> Float32s:
     assert scan.intensity is not None
     return scan.intensity
 

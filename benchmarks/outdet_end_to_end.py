@@ -16,7 +16,6 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from published_outdet import PublishedPipeline
 from turns import milliseconds_in_turns
 
@@ -30,12 +29,12 @@ from derain.export.runtime import Derainer
 from derain.export.timing import versions
 from derain.models.outdet import OutDet
 from derain.models.published import read_state_dict
-from derain.scan import Bools, Scan
+from derain.scan import Bools, Float32s, Scan
 
 # Runs of each method in a round.
 WARM_UP, RUNS = 2, 5
 
-Method = Callable[[NDArray[np.float32]], Bools]
+Method = Callable[[Float32s], Bools]
 
 
 def main() -> None:
@@ -79,7 +78,7 @@ def _deployed(model: OutDet, threads: int) -> Derainer:
 
 
 def _report_times(
-    methods: dict[str, Method], points: NDArray[np.float32], arguments: argparse.Namespace
+    methods: dict[str, Method], points: Float32s, arguments: argparse.Namespace
 ) -> None:
     calls = {name: lambda method=method: method(points) for name, method in methods.items()}
     times = milliseconds_in_turns(calls, arguments.rounds, RUNS, WARM_UP)
@@ -90,7 +89,7 @@ def _report_times(
         print(f"{name:10} p10 {low:8.1f}  p50 {median:8.1f}  p90 {high:8.1f} ms {ratio:8.1f} times")
 
 
-def _report_masks(methods: dict[str, Method], points: NDArray[np.float32]) -> None:
+def _report_masks(methods: dict[str, Method], points: Float32s) -> None:
     masks = {name: method(points) for name, method in methods.items()}
     differ = int((masks["published"] != masks["derain"]).sum())
     print(f"masks of published and derain differ on {differ} points")

@@ -21,7 +21,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 from sklearn.linear_model import LogisticRegression
 
@@ -32,7 +31,7 @@ from derain.export.recorded import DOUBTFUL, solidity
 from derain.export.runtime import Derainer
 from derain.recordings.evidence import ScanPoints, surroundings_features
 from derain.recordings.rays import RayEvidence, mean_evidence
-from derain.scan import Bools, Floats
+from derain.scan import Bools, Float32s, Floats
 from derain.sources.frame import Frame
 from derain.sources.recordings import recordings_of
 from derain.system.cores import usable_cores
@@ -58,7 +57,7 @@ class Described:
     rays: RayEvidence
     rays_to_solid: list[RayEvidence]
     surroundings: Floats
-    alone: NDArray[np.float32]
+    alone: Float32s
     rain: Bools
 
 

@@ -9,12 +9,11 @@ from collections.abc import Mapping
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from sklearn.neighbors import KDTree
 from torch import Tensor
 from torch.nn import functional
 
-from derain.scan import Bools
+from derain.scan import Bools, Float32s
 
 NEIGHBOURS = 9
 
@@ -41,7 +40,7 @@ class PublishedPipeline:
         self.std = np.array(std)
         self.leaf_size = leaf_size
 
-    def __call__(self, points: NDArray[np.float32]) -> Bools:
+    def __call__(self, points: Float32s) -> Bools:
         """Returns True for points, float32 (N, 4), that are rain, bool (N,)."""
         tree = KDTree(points[:, :3], leaf_size=self.leaf_size)
         distances, neighbours = tree.query(points[:, :3], k=NEIGHBOURS)

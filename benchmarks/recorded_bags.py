@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from rosbags import rosbag1, rosbag2
 from rosbags.interfaces import (
     Qos,
@@ -21,6 +20,8 @@ from rosbags.interfaces import (
     QosTime,
 )
 from rosbags.typesys import Stores, get_typestore
+
+from derain.scan import Array
 
 Storage = Literal["sqlite3", "mcap", "ros1"]
 STORAGES: Sequence[Storage] = ("sqlite3", "mcap", "ros1")
@@ -90,7 +91,7 @@ class Ros:
         counter = {"seq": 7} if self.is_ros1 else {}
         return self.new("std_msgs/msg/Header", stamp=stamp, frame_id=frame, **counter)
 
-    def cloud(self, table: NDArray[Any], time: int, *, shape: tuple[int, int] | None = None) -> Any:
+    def cloud(self, table: Array, time: int, *, shape: tuple[int, int] | None = None) -> Any:
         """A PointCloud2 of a structured array, with the gaps and the byte order that it has."""
         assert table.dtype.fields is not None
         fields = []
@@ -148,7 +149,7 @@ class Ros:
         return bytes(serialize(message, type_))
 
 
-def drive(ros: Ros, tables: Iterable[NDArray[Any]]) -> list[Recorded]:
+def drive(ros: Ros, tables: Iterable[Array]) -> list[Recorded]:
     """Clouds at ten a second, each after two readings of an IMU and a text of the same time."""
     messages = []
     for number, table in enumerate(tables):
@@ -196,7 +197,7 @@ def connections_of(path: Path) -> list[tuple[Any, ...]]:
         return [(c.topic, c.msgtype, c.msgdef, c.digest, c.ext) for c in reader.connections]
 
 
-def table_of(columns: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
+def table_of(columns: Mapping[str, Array]) -> Array:
     """Columns as one structured array, packed."""
     size = len(next(iter(columns.values())))
     table = np.empty(size, [(name, column.dtype) for name, column in columns.items()])

@@ -12,7 +12,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.labelled import read_labelled
 from derain.cards.card import load_card
@@ -20,7 +19,7 @@ from derain.datamodules.user_changes import across, along
 from derain.evaluation.text_tables import markdown_table
 from derain.export.methods import load_method
 from derain.files import read_scan
-from derain.scan import Bools, Scan
+from derain.scan import Bools, Float32s, Scan
 
 SNOW = Path("data/wads/sample.bin")
 CLEAN = Path("data/clean/kitti_hdl64.bin")
@@ -93,7 +92,7 @@ def doubled(scan: Scan) -> Iterator[tuple[str, Scan]]:
         yield f"clean KITTI, doubled at {1e3 * behind:g} mm", replace(scan.take(rows), xyz=xyz)
 
 
-def _turned(xyz: NDArray[np.float32], angle: float) -> NDArray[np.float32]:
+def _turned(xyz: Float32s, angle: float) -> Float32s:
     sine, cosine = np.sin(angle), np.cos(angle)
     turn = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]])
     return (xyz @ turn).astype(np.float32)

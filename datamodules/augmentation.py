@@ -5,10 +5,9 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.datamodules.user_changes import changed_as_by_users, in_sector
-from derain.scan import Bools, Scan
+from derain.scan import Bools, Float32s, Scan
 from derain.views.spherical_grid import ALL_AROUND, FULL_CIRCLE
 
 # How often rain alone is made brighter or darker, by up to e to this power; and how often that is
@@ -122,13 +121,13 @@ class Augmentation:
         return changed
 
 
-def _turn(angle: float) -> NDArray[np.float32]:
+def _turn(angle: float) -> Float32s:
     """Turns rows of x, y, z about the vertical axis."""
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]], np.float32)
 
 
-def _mirror(azimuth: float) -> NDArray[np.float32]:
+def _mirror(azimuth: float) -> Float32s:
     """Mirrors rows of x, y, z in the vertical plane that points to an azimuth, radians."""
     cosine, sine = np.cos(2 * azimuth), np.sin(2 * azimuth)
     return np.array([[cosine, sine, 0], [sine, -cosine, 0], [0, 0, 1]], np.float32)
@@ -154,21 +153,19 @@ def with_other_brightness(scan: Scan, rain: Bools, generator: np.random.Generato
     return replace(scan, intensity=intensity)
 
 
-def _of_all(known: NDArray[np.float32], generator: np.random.Generator) -> NDArray[np.float32]:
+def _of_all(known: Float32s, generator: np.random.Generator) -> Float32s:
     match generator.integers(3):
         case 0:
             return np.zeros_like(known)
         case 1:
-            inverted: NDArray[np.float32] = known.max() - known
+            inverted: Float32s = known.max() - known
             return inverted
         case _:
             levels = np.sort(generator.choice(known, FEW_LEVELS - 1))
             return np.searchsorted(levels, known).astype(np.float32)
 
 
-def _with_other_rain(
-    intensity: NDArray[np.float32], rain: Bools, generator: np.random.Generator
-) -> NDArray[np.float32]:
+def _with_other_rain(intensity: Float32s, rain: Bools, generator: np.random.Generator) -> Float32s:
     largest = intensity.max()
     factor = np.exp(generator.uniform(-STRONGEST, STRONGEST))
     result = np.where(rain, np.minimum(intensity * factor, largest), intensity)

@@ -7,9 +7,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from derain.scan import Bools, Floats, Scan
+from derain.scan import Bools, Float32s, Floats, Scan
 from derain.simulation.drawing import log_uniform
 from derain.views.spherical_grid import FULL_CIRCLE
 
@@ -111,7 +110,7 @@ ALL_CHANGES: dict[str, Callable[[Scan, np.random.Generator], Scan]] = {
 }
 
 
-def along(xyz: NDArray[np.float32], metres: Floats) -> NDArray[np.float32]:
+def along(xyz: Float32s, metres: Floats) -> Float32s:
     """Points moved along their rays, away from the sensor, float32 (N, 3).
 
     Args:
@@ -121,9 +120,7 @@ def along(xyz: NDArray[np.float32], metres: Floats) -> NDArray[np.float32]:
     return (xyz + _rays(xyz) * metres[:, None]).astype(np.float32)
 
 
-def across(
-    xyz: NDArray[np.float32], spread: float, generator: np.random.Generator
-) -> NDArray[np.float32]:
+def across(xyz: Float32s, spread: float, generator: np.random.Generator) -> Float32s:
     """Points moved aside and up, across their rays, at random, float32 (N, 3).
 
     Args:
@@ -155,7 +152,7 @@ def in_sector(scan: Scan, width: float, generator: np.random.Generator) -> Bools
     return np.abs(off) <= width / 2
 
 
-def _rays(xyz: NDArray[np.float32]) -> Floats:
+def _rays(xyz: Float32s) -> Floats:
     """Unit vectors from the sensor, float64 (N, 3)."""
     wide = xyz.astype(np.float64)
     rays: Floats = wide / np.linalg.norm(wide, axis=1, keepdims=True)

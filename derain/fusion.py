@@ -2,15 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import small_gicp
-from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.extrinsics import Extrinsics
-from derain.scan import Floats, Ints, Scan
+from derain.scan import Array, Float32s, Floats, Ints, Scan
 from derain.system.cores import usable_cores
 from derain.views.morton import distinct_rows
 
@@ -90,7 +88,7 @@ def fuse(
     xyz = np.concatenate([lidar.xyz, radar.xyz])
     intensity = np.concatenate([_intensity(lidar), _intensity(radar)])
     is_radar = np.arange(len(xyz)) >= len(lidar)
-    columns: dict[str, NDArray[Any]] = {}
+    columns: dict[str, Array] = {}
     if channels:
         merged = *xyz.T, intensity, is_radar.astype(np.uint8)
         columns = dict(zip(MERGED_COLUMNS, merged, strict=True))
@@ -99,7 +97,7 @@ def fuse(
     return Scan(xyz, intensity, label, is_radar, columns, name=lidar.name)
 
 
-def transfer_labels(labelled: Scan, xyz: NDArray[np.float32], within: float = LABEL_WITHIN) -> Ints:
+def transfer_labels(labelled: Scan, xyz: Float32s, within: float = LABEL_WITHIN) -> Ints:
     """Labels points by the nearest valid point of a labelled scan.
 
     Where several rows of the scan lie at one position, the label of the first of them counts.
@@ -143,7 +141,7 @@ def _moved(scan: Scan, extrinsics: Extrinsics) -> Scan:
     return replace(scan, xyz=xyz)
 
 
-def _intensity(scan: Scan) -> NDArray[np.float32]:
+def _intensity(scan: Scan) -> Float32s:
     return np.zeros(len(scan), np.float32) if scan.intensity is None else scan.intensity
 
 
@@ -155,7 +153,7 @@ def _label(lidar: Scan, radar: Scan, within: float) -> Ints | None:
     return np.concatenate([lidar.label, radar.label])
 
 
-def _channel(name: str, lidar_points: int, radar: Scan) -> NDArray[np.float32]:
+def _channel(name: str, lidar_points: int, radar: Scan) -> Float32s:
     column = radar.channel(name) if len(radar) else np.zeros(0, np.float32)
     if column is None:
         raise InputError(

@@ -8,14 +8,13 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from derain.evaluation.counts import or_none, ratio
 from derain.evaluation.text_tables import number_text
 from derain.export.runtime import Derainer
 from derain.export.runtimes.session import DEFAULT_RUNTIME, Runtime
-from derain.scan import Bools, Scan
+from derain.scan import Bools, Float32s, Scan
 from derain.views.probability import probability_of_rain
 from derain.views.view import ViewedScan
 
@@ -201,7 +200,7 @@ def prove(
         runtime: Runtime of the exported model.
     """
 
-    def expect(view: ViewedScan) -> NDArray[np.float32]:
+    def expect(view: ViewedScan) -> Float32s:
         tensors = {title: torch.from_numpy(array) for title, array in view.inputs().items()}
         with torch.inference_mode():
             return forward(**tensors).numpy()
@@ -224,7 +223,7 @@ def compare_runtimes(
 
 
 def _proof(
-    expect: Callable[[ViewedScan], NDArray[np.float32]],
+    expect: Callable[[ViewedScan], Float32s],
     derainers: Sequence[Derainer],
     scans: Iterable[tuple[str, Scan]],
     bounds: Bounds,
@@ -245,7 +244,7 @@ def _case(
     name: str,
     view: ViewedScan,
     returned: Bools,
-    expected: NDArray[np.float32],
+    expected: Float32s,
     derainer: Derainer,
     bounds: Bounds,
 ) -> Case:

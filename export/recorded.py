@@ -7,13 +7,12 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.export.runtime import Derainer
 from derain.recordings.placing import PlacedFrames, PlacedMethod
 from derain.recordings.rays import RayEvidence, Rays, mean_evidence, ray_evidence
-from derain.scan import Floats, Ints, Scan
+from derain.scan import Float32s, Floats, Ints, Scan
 from derain.sources.judgement import Judgement
 from derain.sources.recent_frames import FrameInWindow
 from derain.system.stopwatch import Stopwatch
@@ -130,7 +129,7 @@ class RecordedDerainer(PlacedMethod):
         judgement = replace(alone, probability=probability, rain=rain, frame=ready.frame)
         return self.with_warnings(judgement)
 
-    def _with_rays(self, alone: Judgement, scans: WindowOfScans) -> NDArray[np.float32]:
+    def _with_rays(self, alone: Judgement, scans: WindowOfScans) -> Float32s:
         """Probabilities of rain by the model and by the rays of other scans, float32 (N,)."""
         doubtful = np.flatnonzero(alone.probability > DOUBTFUL)
         others = self._placed_others(scans)
@@ -208,7 +207,7 @@ def _fails(scan: Scan) -> ScanIssue:
     )
 
 
-def solidity(probability: NDArray[np.float32], half: float = HALF_SOLID) -> Floats:
+def solidity(probability: Float32s, half: float = HALF_SOLID) -> Floats:
     """How far ends of rays count as something solid, 0..1, float64 (R,).
 
     Args:
@@ -216,7 +215,8 @@ def solidity(probability: NDArray[np.float32], half: float = HALF_SOLID) -> Floa
         half: Log-odds of rain of an end that counts half.
     """
     rain = probability.astype(np.float64)
-    return (1 - rain) / (1 - rain + rain * np.exp(-half))
+    solid: Floats = (1 - rain) / (1 - rain + rain * np.exp(-half))
+    return solid
 
 
 def added_log_odds(evidence: RayEvidence) -> Floats:

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.default import DEFAULT, default_model
 from derain.errors import InputError
@@ -20,7 +19,7 @@ from derain.export.runtimes.session import (
     Session,
     TensorType,
 )
-from derain.scan import Bools, Scan
+from derain.scan import Array, Bools, Float32s, Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
@@ -91,7 +90,7 @@ class Derainer(Method):
         _refuse_other_network(self.session, self.view, self.path)
         self._recent = RecentFrames(self.view.window)
 
-    def __call__(self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None) -> Bools:
+    def __call__(self, points: Scan | Array, stopwatch: Stopwatch | None = None) -> Bools:
         """Returns which points are rain.
 
         Args:
@@ -107,9 +106,7 @@ class Derainer(Method):
         """
         return self.judge(points, stopwatch).rain
 
-    def probability(
-        self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None
-    ) -> NDArray[np.float32]:
+    def probability(self, points: Scan | Array, stopwatch: Stopwatch | None = None) -> Float32s:
         """Probability that each point is rain.
 
         Args:
@@ -125,7 +122,7 @@ class Derainer(Method):
         """
         return self.judge(points, stopwatch).probability
 
-    def judge(self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None) -> Judgement:
+    def judge(self, points: Scan | Array, stopwatch: Stopwatch | None = None) -> Judgement:
         """Judges a scan: which points are rain, and how probably.
 
         Args:
@@ -137,9 +134,7 @@ class Derainer(Method):
         """
         return self.with_warnings(self.judge_silently(points, stopwatch))
 
-    def judge_silently(
-        self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None
-    ) -> Judgement:
+    def judge_silently(self, points: Scan | Array, stopwatch: Stopwatch | None = None) -> Judgement:
         """As :meth:`judge`, without warnings."""
         scan, stopwatch = Scan.of(points), stopwatch or Stopwatch()
         judgement = self._judged(scan, lambda: self.view(scan), stopwatch)
@@ -152,7 +147,7 @@ class Derainer(Method):
         rain = np.where(dark, of_blank.rain, judgement.rain)
         return Judgement(probability, rain, judgement.judged | dark, scan)
 
-    def weather(self, points: Scan | NDArray[Any]) -> ScanWeather:
+    def weather(self, points: Scan | Array) -> ScanWeather:
         """Returns the weather that a scan shows: shares of rain, and visibility.
 
         What was judged already has it as :attr:`Judgement.weather`.
@@ -195,7 +190,7 @@ class Derainer(Method):
         return self._recent.waiting > 0 and self._recent.starts_new_recording(frame)
 
     def push(
-        self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch | None = None
+        self, frame: Frame | Scan | Array, stopwatch: Stopwatch | None = None
     ) -> Judgement | None:
         """Takes the next frame of a recording.
 
@@ -269,7 +264,7 @@ class Derainer(Method):
         options = (self.name, self.threads, self.runtime.name, self.runtime.precision)
         return type(self), options, {"spec": self.spec, "warns": self.warns}
 
-    def logits(self, view: ViewedScan) -> NDArray[np.float32]:
+    def logits(self, view: ViewedScan) -> Float32s:
         """Scores of "not rain" and "rain" of the M cells of a view, float32 (M, 2).
 
         Raises:
@@ -300,7 +295,7 @@ class Derainer(Method):
             rain = probability > self.spec.threshold
         return Judgement(probability, rain, view.judged, scan)
 
-    def _check_scores(self, logits: NDArray[np.float32], view: ViewedScan, scan: Scan) -> None:
+    def _check_scores(self, logits: Float32s, view: ViewedScan, scan: Scan) -> None:
         """Refuses scores that would count as "not rain" because nothing compares with them."""
         if logits.shape != (view.size, 2) or not np.isfinite(logits).all():
             raise InputError(

@@ -5,14 +5,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.counts import Counts, intersection_over_union
 from derain.export.storage import Storage
 from derain.filters import FILTERS, PointFilter, Span, filter_from, filter_view
-from derain.scan import Bools, Scan
+from derain.scan import Bools, Float32s, Scan
 from derain.views.candidates import Candidates
 from derain.views.neighbours import Neighbourhoods
 
@@ -170,7 +169,7 @@ def tune_filter(
     return Tuned(filter_from(name, parameters).as_dict(), iou, pooled_iou(default, labelled))
 
 
-def tune_threshold(judged: Iterable[tuple[NDArray[np.float32], Bools]], threshold: float) -> Tuned:
+def tune_threshold(judged: Iterable[tuple[Float32s, Bools]], threshold: float) -> Tuned:
     """Finds the best threshold of a model, exactly.
 
     Between two neighbouring probabilities all thresholds decide alike, so that one for each gap

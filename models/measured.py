@@ -6,11 +6,9 @@ from dataclasses import astuple
 from typing import Any, ClassVar
 
 import lightning
-import numpy as np
 import torch
 from lightning.pytorch.loggers import TensorBoardLogger
 from lightning.pytorch.trainer.states import TrainerFn
-from numpy.typing import NDArray
 from torch import Tensor
 from torch.utils.tensorboard.summary import hparams
 
@@ -21,7 +19,7 @@ from derain.evaluation.operating_points import ThresholdCounts
 from derain.learning.batch import Batch
 from derain.learning.mean_losses import MeanLosses
 from derain.learning.task import ReadableScans
-from derain.scan import Scan
+from derain.scan import Float32s, Scan
 from derain.spec import Spec
 from derain.system.notices import warn
 from derain.views.probability import probability_of_rain
@@ -100,7 +98,7 @@ class MeasuredModule(lightning.LightningModule, ABC):
             and "rain" of every cell, float (M, 2).
         """
 
-    def validation_step(self, batch: Batch) -> list[NDArray[np.float32]]:
+    def validation_step(self, batch: Batch) -> list[Float32s]:
         """Loss of one batch, its points counted, and the probability of each, as for predict."""
         losses, logits = self.losses(batch)
         self.mean_losses.update(losses, scans=len(batch.measured))
@@ -110,7 +108,7 @@ class MeasuredModule(lightning.LightningModule, ABC):
         """Counts the points of one batch."""
         self._count(batch, self.logits_of(batch))
 
-    def predict_step(self, batch: Batch) -> list[NDArray[np.float32]]:
+    def predict_step(self, batch: Batch) -> list[Float32s]:
         """Probability of rain for every row of every scan, a list of float32 (N,)."""
         return self.probabilities(batch, self.logits_of(batch))
 
@@ -138,7 +136,7 @@ class MeasuredModule(lightning.LightningModule, ABC):
             self._log_identical({"step": torch.tensor(float(self.trained_steps))})
         self._log_scores("test")
 
-    def probabilities(self, batch: Batch, logits: Tensor) -> list[NDArray[np.float32]]:
+    def probabilities(self, batch: Batch, logits: Tensor) -> list[Float32s]:
         """Carries logits back to every row of every scan, as the deployed model does.
 
         Args:
@@ -155,7 +153,7 @@ class MeasuredModule(lightning.LightningModule, ABC):
             for scan, scores in zip(batch.measured, batch.split(logits), strict=True)
         ]
 
-    def _count(self, batch: Batch, logits: Tensor) -> list[NDArray[np.float32]]:
+    def _count(self, batch: Batch, logits: Tensor) -> list[Float32s]:
         probabilities = self.probabilities(batch, logits)
         for measured, probability in zip(batch.measured, probabilities, strict=True):
             scan = measured.scan

@@ -4,10 +4,9 @@ import shutil
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.files.labels import write_labels
-from derain.scan import Ints
+from derain.scan import Float32s, Ints
 
 KEPT = Path(__file__).parent / "export" / "kept"
 
@@ -15,7 +14,7 @@ KEPT = Path(__file__).parent / "export" / "kept"
 BUILDING, FALLING_SNOW = 50, 110
 
 
-def wall_and_drops() -> tuple[NDArray[np.float32], Ints]:
+def wall_and_drops() -> tuple[Float32s, Ints]:
     """A scan in which every filter finds the rain and nothing else, and its labels.
 
     Returns:

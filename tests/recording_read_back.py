@@ -3,11 +3,10 @@
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
 from derain.pictures.entities import FRAME, TIME
+from derain.scan import Float32s
 
 POSITIONS = "Points3D:positions"
 
@@ -37,7 +36,7 @@ class ReadBack:
         """What a component is, by the number of the scan; None for what it is at all times."""
         return self._values.get((entity, component), {})
 
-    def points(self, entity: str) -> dict[int | None, NDArray[np.float32]]:
+    def points(self, entity: str) -> dict[int | None, Float32s]:
         """The points of an entity by the number of the scan, float32 (N, 3)."""
         found = self.values(entity, POSITIONS)
         return {n: xyz.flatten().to_numpy().reshape(-1, 3) for n, xyz in found.items()}

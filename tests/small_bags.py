@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 from benchmarks.recorded_bags import Recorded, Ros, Storage, drive, table_of, write_bag
 from derain.bags.bag import Bag
 from derain.bags.bag_copy import BagCopy
 from derain.evaluation.hard_cases import scene
+from derain.scan import Array
 
 POINTS = 300
 
 
-def tables(number: int = 3, points: int = POINTS) -> list[NDArray[Any]]:
+def tables(number: int = 3, points: int = POINTS) -> list[Array]:
     """Clouds with drops in them, as structured arrays of x, y, z, intensity and ring."""
     made = []
     for seed in range(number):
@@ -36,7 +36,7 @@ def small_bag(
     folder: Path,
     storage: Storage,
     name: str = "drive",
-    clouds: Iterable[NDArray[Any]] | None = None,
+    clouds: Iterable[Array] | None = None,
     more: Iterable[Recorded] = (),
 ) -> Path:
     """A bag of clouds, of an IMU and of texts, and of what else there is to be in it."""

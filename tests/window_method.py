@@ -5,11 +5,10 @@ from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.recordings.recording_method import RecordingMethod
-from derain.scan import Scan
+from derain.scan import Array, Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.recent_frames import FrameInWindow, RecentFrames
@@ -58,7 +57,7 @@ class Between(RecordingMethod):
         return self.waiting > 0 and self._recent.starts_new_recording(frame)
 
     def push(
-        self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch | None = None
+        self, frame: Frame | Scan | Array, stopwatch: Stopwatch | None = None
     ) -> Judgement | None:
         assert isinstance(frame, Frame)
         assert not frame.has_labels

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from derain.files.columns import scan_of
 from derain.files.content import check_columns
-from derain.scan import Bools, Scan, named
+from derain.scan import Array, Bools, Float32s, Scan, named
 
 # PointField's datatypes, in NumPy's spelling.
 DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
@@ -118,7 +118,7 @@ class PointCloud:
         """True if its rows are rows of the sensor."""
         return self.height > 1
 
-    def columns(self) -> dict[str, NDArray[Any]]:
+    def columns(self) -> dict[str, Array]:
         """Name → its values, (N,) or (N, count), row after row, in the byte order of the machine.
 
         Read-only views of the bytes where that order is the cloud's own; padding is left out.
@@ -172,7 +172,7 @@ class PointCloud:
         by_name = {field.name: field for field in self.fields}
         for axis in AXES:
             if (field := named(by_name, axis, "the cloud")) is not None:
-                values: NDArray[Any] = np.ndarray(
+                values: Array = np.ndarray(
                     (self.height, self.width),
                     field.dtype(self._order),
                     data,
@@ -182,7 +182,7 @@ class PointCloud:
                 values[rows.reshape(values.shape)] = np.nan
         return replace(self, data=bytes(data), is_dense=False)
 
-    def with_field(self, name: str, values: NDArray[np.float32]) -> Self:
+    def with_field(self, name: str, values: Float32s) -> Self:
         """The same points with a field of float32 after those that they have.
 
         One that is there already, as in a bag that was cleaned before, takes the new values.

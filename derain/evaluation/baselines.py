@@ -6,13 +6,12 @@ are dim and near.
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.evaluation.counts import intersection_over_union, table_of
-from derain.scan import Bools, Floats, Ints, Scan
+from derain.scan import Array, Bools, Float32s, Floats, Ints, Scan
 from derain.views.scan_issues import ScanIssue, missing_intensity
 
 # Edge of the voxels, metres, in which it is learnt where it rains.
@@ -71,8 +70,8 @@ class PositionPrior:
             The prior; without rain to learn from, it calls nothing rain.
         """
         number = np.zeros(0, np.int64)
-        points: NDArray[Any] = np.zeros(0)
-        hits: NDArray[Any] = np.zeros(0)
+        points: Array = np.zeros(0)
+        hits: Array = np.zeros(0)
         for scan, rain in scans:
             own = _voxel_of(scan.xyz[scan.valid])
             number, row = np.unique(np.append(number, own), return_inverse=True)
@@ -139,7 +138,7 @@ class IntensityRule:
         return cls(float(limits[0][row]), float(limits[1][column]))
 
 
-def _limits_of(values: NDArray[np.float32]) -> NDArray[np.float32]:
+def _limits_of(values: Float32s) -> Float32s:
     """Limits to try, ascending, float32 (L,): the best one is a value of the rain itself.
 
     Args:
@@ -169,7 +168,7 @@ def _best_called_rain(points: Floats, rain: Floats) -> Ints:
     return order[: np.argmax(iou) + 1]
 
 
-def _voxel_of(xyz: NDArray[np.float32]) -> Ints:
+def _voxel_of(xyz: Float32s) -> Ints:
     """Number of each point's voxel, int64 (N,); points beyond the outermost voxels lie in those."""
     half = 2 ** (AXIS_BITS - 1)
     cell = np.clip(np.floor(xyz.astype(np.float64) / VOXEL), -half, half - 1).astype(np.int64)

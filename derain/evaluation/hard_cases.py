@@ -3,12 +3,11 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-from derain.scan import Bools, Scan
+from derain.scan import Bools, Float32s, Scan
 
 
-def scene(points: int = 3000, seed: int = 0) -> NDArray[np.float32]:
+def scene(points: int = 3000, seed: int = 0) -> Float32s:
     """An ordinary small scene: a road, a wall, and drops in the air between.
 
     Args:
@@ -67,7 +66,7 @@ def hard_cases(largest: int = 20_000) -> Iterator[tuple[str, Scan]]:
         yield name, Scan.of(points)
 
 
-def _with_rows(points: NDArray[np.float32], values: list[float]) -> NDArray[np.float32]:
+def _with_rows(points: Float32s, values: list[float]) -> Float32s:
     """Overwrites every tenth row with one of the values, in turn."""
     points = points.copy()
     rows = np.arange(0, len(points), 10)
@@ -75,13 +74,13 @@ def _with_rows(points: NDArray[np.float32], values: list[float]) -> NDArray[np.f
     return points
 
 
-def _scaled_to_range(points: NDArray[np.float32], reach: float) -> NDArray[np.float32]:
+def _scaled_to_range(points: Float32s, reach: float) -> Float32s:
     points = points.copy()
     points[:, :3] *= reach / np.linalg.norm(points[:, :3], axis=1, keepdims=True)
     return points
 
 
-def _behind(points: NDArray[np.float32]) -> NDArray[np.float32]:
+def _behind(points: Float32s) -> Float32s:
     """Moves every point exactly behind the sensor, with y 0.0 or -0.0."""
     points = points * np.array([-1, 0, 1, 1], np.float32)
     points[::2, 1] = 0.0
@@ -89,9 +88,7 @@ def _behind(points: NDArray[np.float32]) -> NDArray[np.float32]:
     return points
 
 
-def _without_inclinations(
-    points: NDArray[np.float32], lowest: float, highest: float
-) -> NDArray[np.float32]:
+def _without_inclinations(points: Float32s, lowest: float, highest: float) -> Float32s:
     """Removes the points between two inclinations, in degrees."""
     x, y, z = points[:, :3].T
     inclination = np.degrees(np.arctan2(z, np.hypot(x, y)))
@@ -99,7 +96,7 @@ def _without_inclinations(
     return points[outside]
 
 
-def _sphere() -> NDArray[np.float32]:
+def _sphere() -> Float32s:
     """Returns at 10 m and of intensity 50, about one in each pixel of 64 × 256."""
     azimuth, inclination = np.meshgrid(
         np.radians(np.linspace(-180, 180, 256, endpoint=False)),
@@ -111,7 +108,7 @@ def _sphere() -> NDArray[np.float32]:
     return np.column_stack([points, np.full(len(points), 50)]).astype(np.float32)
 
 
-def _with_intensity(points: NDArray[np.float32], intensity: float) -> NDArray[np.float32]:
+def _with_intensity(points: Float32s, intensity: float) -> Float32s:
     points = points.copy()
     points[:, 3] = intensity
     return points

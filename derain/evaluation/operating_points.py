@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 from torchmetrics import Metric
 
 from derain.evaluation.counts import Counts, intersection_over_union, ratio, table_of
-from derain.scan import Bools, Floats, Ints
+from derain.scan import Bools, Float32s, Floats, Ints
 
 # Thresholds from 0 to 1 in equal steps; TensorBoard's curves take no more than 127.
 CURVE_THRESHOLDS = np.linspace(0, 1, 101)
@@ -108,7 +107,7 @@ class ThresholdCounts(Metric):
         bins = torch.zeros(2, len(self.thresholds) + 1, dtype=torch.int64)
         self.add_state("bins", bins, dist_reduce_fx="sum")
 
-    def update(self, probability: NDArray[np.float32], rain: Bools) -> None:
+    def update(self, probability: Float32s, rain: Bools) -> None:
         """Counts the points of a scan.
 
         Args:

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.scan import Bools, Floats, Ints
+from derain.scan import Bools, Float32s, Floats, Ints
 from derain.views.morton import evenly
 from derain.views.scatter import scatter_through_space
 
 # Neighbourhoods of some points, given by their rows: rows of points int64 (Q, k), the point itself
 # first, and distances in metres, float32 (Q, k).
-Around = Callable[[Ints], tuple[Ints, NDArray[np.float32]]]
+Around = Callable[[Ints], tuple[Ints, Float32s]]
 
 # Points whose neighbourhoods are looked at.
 SAMPLE = 4096
@@ -52,7 +52,7 @@ class RainBounds:
     is_bright: bool
     range: float
 
-    def hold(self, intensity: NDArray[np.float32], distance: NDArray[np.floating[Any]]) -> Bools:
+    def hold(self, intensity: Float32s, distance: NDArray[np.floating[Any]]) -> Bools:
         """True for points within the bounds, bool (M,).
 
         Args:
@@ -68,7 +68,7 @@ class RainBounds:
 def fit_rain_bounds(
     xyz: Floats,
     distance: Floats,
-    intensity: NDArray[np.float32],
+    intensity: Float32s,
     may_be: Bools,
     around: Around,
     sparseness: float,
@@ -114,7 +114,7 @@ def fit_rain_bounds(
 def _is_airborne(
     xyz: Floats,
     distance: Floats,
-    neighbourhoods: tuple[Ints, NDArray[np.float32]],
+    neighbourhoods: tuple[Ints, Float32s],
     sparseness: float,
 ) -> Bools:
     """True for neighbourhoods that are scattered through space and sparse, bool (Q,)."""
@@ -124,9 +124,7 @@ def _is_airborne(
     return np.asarray(sparse & (scatter_through_space(xyz, neighbours) > OFF_SURFACES))
 
 
-def _greatest_difference(
-    intensity: NDArray[np.float32], airborne: Bools
-) -> tuple[float, bool, float]:
+def _greatest_difference(intensity: Float32s, airborne: Bools) -> tuple[float, bool, float]:
     """The bound that separates best what is in the air.
 
     Args:

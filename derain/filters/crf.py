@@ -6,14 +6,13 @@ from functools import partial
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.filters.airborne import Around, fit_rain_bounds
 from derain.filters.ground import find_ground
 from derain.filters.point_filter import FILTERS, PointFilter, RainAndPoints, filter_view
 from derain.filters.random_field import decide_sequentially
-from derain.scan import Bools, Floats, Ints, Scan
+from derain.scan import Bools, Float32s, Floats, Ints, Scan
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
 from derain.views.channels import filled_values
@@ -149,7 +148,7 @@ class CRF(PointFilter):
         if self.variant == "published":
             yield from intensity_of_another_scale(scan, self.FULL_SCALE, self.name)
 
-    def _rain(self, points: NDArray[np.float32], around: Around) -> Bools:
+    def _rain(self, points: Float32s, around: Around) -> Bools:
         """True for points that are rain, bool (M,).
 
         Args:
@@ -172,7 +171,7 @@ class CRF(PointFilter):
         return decide_sequentially(feature, rows, place, neighbours, distances, self.vote)
 
     def _is_candidate(
-        self, xyz: Floats, intensity: NDArray[np.float32], distance: Floats, around: Around
+        self, xyz: Floats, intensity: Float32s, distance: Floats, around: Around
     ) -> Bools:
         """True for points that may be rain, bool (M,)."""
         if self.variant == "published":

@@ -5,11 +5,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.filters.point_filter import PointFilter, rows_of
-from derain.scan import Bools, Scan
+from derain.scan import Array, Bools, Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
@@ -55,7 +54,7 @@ class FilterDerainer(Method):
         self.threads = threads_of(threads)
         self.candidates = candidates
 
-    def __call__(self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None) -> Bools:
+    def __call__(self, points: Scan | Array, stopwatch: Stopwatch | None = None) -> Bools:
         """Returns which points are rain.
 
         Args:
@@ -68,7 +67,7 @@ class FilterDerainer(Method):
         """
         return self.judge(points, stopwatch).rain
 
-    def judge(self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None) -> Judgement:
+    def judge(self, points: Scan | Array, stopwatch: Stopwatch | None = None) -> Judgement:
         """Judges a scan.
 
         Args:
@@ -81,7 +80,7 @@ class FilterDerainer(Method):
             rain, judged = rows_of(of_points, point), point >= 0
         return self.with_warnings(Judgement(rain.astype(np.float32), rain, judged, scan))
 
-    def weather(self, points: Scan | NDArray[Any]) -> ScanWeather:
+    def weather(self, points: Scan | Array) -> ScanWeather:
         """Returns the weather that a scan shows.
 
         What was judged already has it as :attr:`Judgement.weather`.
@@ -100,9 +99,7 @@ class FilterDerainer(Method):
         """No scans but the one that it judges."""
         return self.window
 
-    def push(
-        self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch | None = None
-    ) -> Judgement:
+    def push(self, frame: Frame | Scan | Array, stopwatch: Stopwatch | None = None) -> Judgement:
         """Judges the next frame of a recording, at once.
 
         Args:

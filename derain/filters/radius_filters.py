@@ -11,10 +11,9 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.filters.point_filter import FILTERS, TUNED_NEIGHBOURS, PointFilter, RainAndPoints
-from derain.scan import Bools, Floats, Ints, Scan
+from derain.scan import Bools, Float32s, Floats, Ints, Scan
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
 from derain.views.morton import distinct_rows
@@ -37,7 +36,7 @@ class RadiusFilter(PointFilter):
     """
 
     @abstractmethod
-    def radius_at(self, points: NDArray[np.float32]) -> Floats:
+    def radius_at(self, points: Float32s) -> Floats:
         """The radius around each point.
 
         Args:
@@ -100,7 +99,7 @@ class ROR(RadiusFilter):
     neighbours: int = 4
     radius: float = 0.08
 
-    def radius_at(self, points: NDArray[np.float32]) -> Floats:
+    def radius_at(self, points: Float32s) -> Floats:
         """The radius around each point; see :class:`RadiusFilter`."""
         return np.full(len(points), self.radius, np.float64)
 
@@ -156,7 +155,7 @@ class DROR(RadiusFilter):
     minimum_radius: float = 0.04
     variant: Literal["code", "paper"] = "code"
 
-    def radius_at(self, points: NDArray[np.float32]) -> Floats:
+    def radius_at(self, points: Float32s) -> Floats:
         """The radius around each point; see :class:`RadiusFilter`."""
         x, y = points[:, :2].T.astype(np.float64)
         angle = math.radians(self.azimuth_resolution)
@@ -166,7 +165,7 @@ class DROR(RadiusFilter):
 
 
 def has_few_neighbours(
-    xyz: NDArray[np.float32], radius: Floats, count: int, threads: int, queried: Bools | None = None
+    xyz: Float32s, radius: Floats, count: int, threads: int, queried: Bools | None = None
 ) -> Bools:
     """Finds the points that have fewer than ``count`` points within their radius.
 

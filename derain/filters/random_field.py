@@ -1,9 +1,8 @@
 """Decisions that each depend on those of the neighbours that were judged before."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from derain.scan import Bools, Floats, Ints
+from derain.scan import Bools, Float32s, Floats, Ints
 
 # Features from -1 to 1 above the first are rain, and those up to the second are not, whatever the
 # neighbours are.
@@ -20,7 +19,7 @@ def decide_sequentially(
     rows: Ints,
     place: Ints,
     neighbours: Ints,
-    distances: NDArray[np.float32],
+    distances: Float32s,
     vote: float,
 ) -> Bools:
     """Judges points one after the other, each by its feature and by its neighbours.

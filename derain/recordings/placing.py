@@ -2,14 +2,12 @@
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 from weakref import WeakKeyDictionary
-
-from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.recordings.odometry import FrameOdometry
-from derain.scan import Scan
+from derain.scan import Array, Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
@@ -40,9 +38,7 @@ class PlacedFrames(RecentFrames):
         self._stretch = 0
         self._has_poses: bool | None = None  # whether the last frame had a pose; None before any
 
-    def place(
-        self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch
-    ) -> FrameInWindow | None:
+    def place(self, frame: Frame | Scan | Array, stopwatch: Stopwatch) -> FrameInWindow | None:
         """Reads and places the next frame; a new recording drops those still waiting.
 
         Args:
@@ -112,7 +108,7 @@ class PlacedMethod(Method):
         return self.waiting > 0 and self._recent.starts_new_recording(frame)
 
     def push(
-        self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch | None = None
+        self, frame: Frame | Scan | Array, stopwatch: Stopwatch | None = None
     ) -> Judgement | None:
         """Takes the next frame of a recording; see :meth:`derain.sources.method.Method.push`.
 

@@ -3,10 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
-
-from derain.scan import Bools, Scan
+from derain.scan import Bools, Float32s, Scan
 from derain.sources.frame import Frame
 from derain.weather.scan_weather import ScanWeather
 
@@ -28,7 +25,7 @@ class Judgement:
             always sure.
     """
 
-    probability: NDArray[np.float32]
+    probability: Float32s
     rain: Bools
     judged: Bools
     scan: Scan

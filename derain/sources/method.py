@@ -9,10 +9,8 @@ from functools import cached_property
 from hashlib import sha256
 from typing import Any, ClassVar
 
-from numpy.typing import NDArray
-
 from derain.errors import ScanWarning
-from derain.scan import Scan
+from derain.scan import Array, Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.system.stopwatch import Stopwatch
@@ -71,7 +69,7 @@ class Method(ABC):
 
     @abstractmethod
     def push(
-        self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch | None = None
+        self, frame: Frame | Scan | Array, stopwatch: Stopwatch | None = None
     ) -> Judgement | None:
         """Takes the next frame of a recording.
 

@@ -4,16 +4,13 @@ import os
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
-
-from numpy.typing import NDArray
 
 from derain.cards.known import label_places
 from derain.errors import InputError
 from derain.files import write_scan
 from derain.files.labels import LABEL, label_beside, write_labels
 from derain.files.names import beside
-from derain.scan import Scan
+from derain.scan import Array, Scan
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
 from derain.stores.url import url_of
@@ -63,7 +60,7 @@ class FolderSink:
                     f"Take them in two runs, each to its {self.option}.",
                 )
 
-    def write(self, frame: Frame, scan: Scan | None, label: NDArray[Any]) -> None:
+    def write(self, frame: Frame, scan: Scan | None, label: Array) -> None:
         """Writes the scan, then the labels: if the labels exist, the scan is complete.
 
         Args:

@@ -1,11 +1,9 @@
 """Sources of scans: frames in time order."""
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, overload
+from typing import overload
 
-from numpy.typing import NDArray
-
-from derain.scan import Scan
+from derain.scan import Array, Scan
 from derain.sources.frame import Frame, MemoryFrame
 
 
@@ -29,7 +27,7 @@ class Frames(Sequence[Frame]):
         self._frames = tuple(frames)
 
     @classmethod
-    def of_scans(cls, scans: Iterable[Scan | NDArray[Any]], sequence: str = "") -> "Frames":
+    def of_scans(cls, scans: Iterable[Scan | Array], sequence: str = "") -> "Frames":
         """Scans in memory as one sequence, with the labels that they have.
 
         Several sequences are one source by ``Frames([*first, *second])``.

@@ -8,7 +8,7 @@ what stands behind a drop. They are found by direction alone, in a small part of
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.scan import Bools, Ints, Scan
+from derain.scan import Bools, Float32s, Ints, Scan
 
 # Sectors of azimuth, each of 30 degrees like the hours of a clock: the first has x (ahead) in its
 # middle, the next ones follow towards y (left).
@@ -70,7 +70,7 @@ def ray_ends(scan: Scan, rain: Bools) -> Ints:
     return _counted(returns[last_of_ray] & ((1 << BITS_OF_END) - 1))
 
 
-def _azimuth_cells(x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray[np.uint32]:
+def _azimuth_cells(x: Float32s, y: Float32s) -> NDArray[np.uint32]:
     """Numbers of the cells of azimuth that directions lie in, uint32 (M,).
 
     They are alike not in degrees but in y / (|x| + |y|), which takes no trigonometry: it goes
@@ -84,7 +84,7 @@ def _azimuth_cells(x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray[np
     return cells
 
 
-def _inclination_cells(z: NDArray[np.float32], reach: NDArray[np.float32]) -> NDArray[np.uint32]:
+def _inclination_cells(z: Float32s, reach: Float32s) -> NDArray[np.uint32]:
     """Numbers of the cells of inclination, alike in z / range, uint32 (M,)."""
     upwards = np.clip(z / (reach + TINY), -1, 1)  # nearer than 10⁻¹⁹ m the range becomes 0
     return ((upwards + 1) * CELLS_UPWARDS).astype(np.uint32)
@@ -104,7 +104,7 @@ def _sectors_of_cells() -> NDArray[np.int32]:
 SECTOR_OF_CELL = _sectors_of_cells()
 
 
-def _scores(reach: NDArray[np.float32], rain: Bools) -> NDArray[np.int32]:
+def _scores(reach: Float32s, rain: Bools) -> NDArray[np.int32]:
     """Priority of returns among those of their ray, int32 (M,): rain first, the nearest of it."""
     place = np.minimum(reach / BIN, RANGE_BINS - 1)  # not above the last bin, however far
     scores: NDArray[np.int32] = place.astype(np.int32)

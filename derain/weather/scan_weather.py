@@ -3,13 +3,12 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.scan import Bools, Floats, Ints, Scan
+from derain.scan import Array, Bools, Floats, Ints, Scan
 from derain.weather.rays import BIN, RANGE_BINS, RAY_SECTORS, ray_ends
 from derain.weather.visibility import NOT_KNOWN, Visibility, reach_of, visibility_of
 
@@ -43,7 +42,7 @@ class ScanWeather:
     ends: Ints
 
     @classmethod
-    def of(cls, points: Scan | NDArray[Any], rain: Bools) -> Self:
+    def of(cls, points: Scan | Array, rain: Bools) -> Self:
         """The weather of a judged scan.
 
         Args:

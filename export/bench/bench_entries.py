@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.errors import InputError, printable
 from derain.evaluation.baselines import VOXEL, IntensityRule, PositionPrior, all_points, no_points
@@ -29,7 +28,7 @@ from derain.export.runtime import Derainer
 from derain.export.runtimes.session import Runtime
 from derain.filters import FilterDerainer, PointFilter
 from derain.filters.derainer import CANDIDATES
-from derain.scan import Bools, Scan
+from derain.scan import Array, Bools, Scan
 from derain.spec import Spec
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
@@ -43,7 +42,7 @@ FILE_SIZE = "file_bytes"
 
 # A method as a user gives it: a name or a file, a derainer, a filter, or a function from a scan to
 # which of its points are rain, bool (N,).
-GivenMethod = str | Path | Derainer | FilterDerainer | PointFilter | Callable[[Scan], NDArray[Any]]
+GivenMethod = str | Path | Derainer | FilterDerainer | PointFilter | Callable[[Scan], Array]
 
 # Returns scans without points of unknown class, and their rain, bool (N,), for baselines to learn
 # from.
@@ -272,7 +271,7 @@ class TimedFunction:
         function: Returns which points of a scan are rain, bool (N,).
     """
 
-    function: Callable[[Scan], NDArray[Any]]
+    function: Callable[[Scan], Array]
 
     def ready(self, threads: int) -> "TimedFunction":
         """The method itself; a bench does not control the threads of a function."""

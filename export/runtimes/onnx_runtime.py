@@ -4,11 +4,9 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from derain.export.model_file import ModelFile
 from derain.export.runtimes.session import DEFAULT_RUNTIME, RUNTIMES, Session, TensorType
+from derain.scan import Array, Float32s
 from derain.system.cores import usable_cores
 
 # NumPy's names of what onnxruntime calls the types of a view's inputs and of scores.
@@ -60,7 +58,7 @@ class OnnxRuntimeSession(Session):
         """Outputs of the network, in order."""
         return [_type_of(value) for value in self.session.get_outputs()]
 
-    def run(self, inputs: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
+    def run(self, inputs: Mapping[str, Array]) -> Float32s:
         """The network's first output."""
         return self.session.run(None, inputs)[0]  # type: ignore[no-any-return]
 

@@ -6,11 +6,11 @@ from threading import Lock
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.export.model_file import ModelFile
 from derain.export.runtimes.session import FLOAT32_PRECISION, RUNTIMES, Session, TensorType
+from derain.scan import Array, Float32s
 from derain.system.extras import OPENVINO
 
 DEVICE = "CPU"
@@ -77,7 +77,7 @@ class OpenVinoSession(Session):
         """Outputs of the network, in order."""
         return [_type_of(port) for port in self.model.outputs]
 
-    def run(self, inputs: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
+    def run(self, inputs: Mapping[str, Array]) -> Float32s:
         """The network's first output."""
         with self._one_at_a_time:  # a second call would be refused while the request is busy
             self._request.infer({name: inputs[name] for name in self._taken}, share_inputs=True)

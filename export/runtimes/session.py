@@ -3,14 +3,12 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import ClassVar
 
 from derain.errors import InputError, did_you_mean
 from derain.export.model_file import ModelFile
 from derain.files.documents import short
+from derain.scan import Array, Float32s
 from derain.system.registry import Registry
 
 # Those of this folder, and those that other packages bring.
@@ -78,7 +76,7 @@ class Session(ABC):
         """Outputs of the network, in order."""
 
     @abstractmethod
-    def run(self, inputs: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
+    def run(self, inputs: Mapping[str, Array]) -> Float32s:
         """The network's first output, an array of its own.
 
         Args:

@@ -5,15 +5,14 @@ from pathlib import Path
 from typing import Any
 
 import lightning
-import numpy as np
 import torch
 from lightning.pytorch.callbacks import BasePredictionWriter
-from numpy.typing import NDArray
 
 from derain.errors import printable
 from derain.learning.batch import Batch
 from derain.learning.task import ReadableScans
 from derain.models.base import DerainingModule
+from derain.scan import Float32s
 from derain.sources.frame import MemoryFrame
 from derain.sources.sink import LabelSink
 
@@ -50,7 +49,7 @@ class PredictionWriter(BasePredictionWriter):
         self,
         trainer: lightning.Trainer,
         model: DerainingModule,
-        prediction: Sequence[NDArray[np.float32]],
+        prediction: Sequence[Float32s],
         batch_indices: Sequence[int] | None,
         batch: Batch,
         *_: Any,

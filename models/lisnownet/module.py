@@ -15,7 +15,6 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import torch
 from lightning.pytorch.utilities.types import OptimizerLRScheduler
-from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from derain.cards.card import DataCard
@@ -36,7 +35,7 @@ from derain.models.lisnownet.sparsity import RESIDUALS, sparsity_loss
 from derain.models.published import Published
 from derain.models.range_module import FITTED, range_view, require_grid
 from derain.models.registry import NETWORKS
-from derain.scan import Scan
+from derain.scan import Float32s, Scan
 from derain.views.range_image import RangeView
 from derain.views.view import View
 
@@ -225,7 +224,7 @@ class LiSnowNet(DerainingModule, Published):
         image, valid = (torch.from_numpy(inputs[name]) for name in ("image", "valid"))
         return image.to(self.device), valid.to(self.device)
 
-    def _changes(self, image: Tensor, valid: Tensor) -> NDArray[np.float32]:
+    def _changes(self, image: Tensor, valid: Tensor) -> Float32s:
         """Changes by the network at the returns within the rule's limits, float32 (M,)."""
         seen = cube_roots(image, self.selection)
         changes = denoising_change(seen, self.network(seen, valid))

@@ -6,13 +6,12 @@ from typing import Self
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from derain.errors import InputError
 from derain.files.documents import Entry
 from derain.models.range_module import per_pixel
-from derain.scan import Scan
+from derain.scan import Float32s, Scan
 from derain.views.full_scale import full_scale
 
 # Where a sensor on a vehicle sees the road well, metres from its axis.
@@ -71,7 +70,7 @@ class SelectionRule:
                 "Both must be above 0.",
             )
 
-    def with_residual_of(self, products: NDArray[np.float32]) -> Self:
+    def with_residual_of(self, products: Float32s) -> Self:
         """The same rule with the residual that parts returns into changed and unchanged.
 
         It is Otsu's threshold of the logarithms, where the two groups are farthest apart for their
@@ -172,7 +171,7 @@ def may_be_rain(image: Tensor, rule: SelectionRule) -> Tensor:
     return (height > rule.ground) & (intensity < rule.intensity * rule.full_scale)
 
 
-def otsu(values: NDArray[np.float32]) -> float:
+def otsu(values: Float32s) -> float:
     """Threshold that parts values into the two groups of least variance within.
 
     Args:

@@ -1,18 +1,17 @@
 """Clouds of any fields: what is kept, what goes, and what is refused."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from derain.bags.point_cloud import DATATYPES, PointCloud, PointField, scan_of_cloud
+from derain.scan import Array
 
 
-def cloud_of_columns(columns: dict[str, NDArray[Any]], big: bool = False) -> PointCloud:
+def cloud_of_columns(columns: dict[str, Array], big: bool = False) -> PointCloud:
     """A cloud of columns, packed one after the other."""
     codes = {name: code for code, name in DATATYPES.items()}
     order = ">" if big else "<"

@@ -6,13 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
 from derain.files import read_scan, write_scan
 from derain.filters import DROR, DSOR, FilterDerainer
-from derain.scan import Bools, Ints, Scan
+from derain.scan import Bools, Float32s, Ints, Scan
 from derain.views.spherical_grid import SphericalGrid
 
 
@@ -190,7 +189,7 @@ def test_a_scan_is_projected_once_and_points_outside_the_grid_are_warned_of(
     points.tofile(tmp_path / "scan.bin")
     projected, pixel = [], SphericalGrid.pixel
 
-    def counting(grid: SphericalGrid, xyz: NDArray[np.float32]) -> Ints:
+    def counting(grid: SphericalGrid, xyz: Float32s) -> Ints:
         projected.append(len(xyz))
         return pixel(grid, xyz)
 

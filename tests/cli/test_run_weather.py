@@ -10,19 +10,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from derain.cli.main import BROKEN_PIPE
 from derain.cli.weather_options import weather_table
 from derain.files import read_scan
-from derain.scan import Floats
+from derain.scan import Float32s, Floats
 from derain.weather.alarm import Alarm, Threshold
 from derain.weather.scan_weather import ScanWeather
 
 MAIN = "import sys; from derain.cli.main import main; sys.exit(main())"
 
 
-def wall(drops: int) -> NDArray[np.float32]:
+def wall(drops: int) -> Float32s:
     """A wall 15 m ahead, 3,000 points, and drops in front of it; float32 (N, 4)."""
     generator = np.random.default_rng(0)
     y, z = np.meshgrid(np.linspace(-1.5, 1.5, 60), np.linspace(-1.2, 1.2, 50))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import read_labels
+from derain.scan import Float32s
 
 pytestmark = pytest.mark.usefixtures("open3d")
 
@@ -71,7 +72,7 @@ def test_a_drive_goes_along_a_street_in_the_rain_of_its_options_without_a_radar(
     assert facts_of(root)["class_share"]["car"] > 0.01
 
 
-def rained(folder: Path, stem: str, columns: int = 4) -> tuple[NDArray[np.float32], NDArray]:
+def rained(folder: Path, stem: str, columns: int = 4) -> tuple[Float32s, NDArray]:
     points = np.fromfile(folder / f"{stem}.bin", "<f4").reshape(-1, columns)
     return points, read_labels(folder / f"{stem}.label", len(points))
 

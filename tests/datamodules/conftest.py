@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from derain.datamodules.base import Loading, ScanDataModule
 from derain.datamodules.folder import Folder
@@ -16,7 +15,7 @@ from derain.files.labels import write_labels
 from derain.learning.task import agree_on_task
 from derain.models.base import DerainingModule
 from derain.models.outdet import OutDet
-from derain.scan import Scan
+from derain.scan import Float32s, Scan
 
 Connect = Callable[..., ScanDataModule]
 
@@ -29,7 +28,7 @@ def write() -> Callable[..., None]:
         scan: Path,
         labels: Path | None = None,
         ids: Sequence[int] = (0,),
-        points: NDArray[np.float32] | None = None,
+        points: Float32s | None = None,
     ) -> None:
         points = scene(50) if points is None else points
         write_scan(scan, Scan.of(points))

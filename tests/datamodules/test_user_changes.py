@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from derain.datamodules.user_changes import (
     ALL_CHANGES,
@@ -13,14 +12,14 @@ from derain.datamodules.user_changes import (
     changed_as_by_users,
 )
 from derain.evaluation.hard_cases import scene
-from derain.scan import Floats, Scan
+from derain.scan import Float32s, Floats, Scan
 
 
 def street() -> Scan:
     return Scan.of(scene(2000)).with_label(np.arange(2000))
 
 
-def directions(xyz: NDArray[np.float32]) -> Floats:
+def directions(xyz: Float32s) -> Floats:
     wide = xyz.astype(np.float64)
     directions: Floats = wide / np.linalg.norm(wide, axis=1, keepdims=True)
     return directions

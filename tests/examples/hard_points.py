@@ -3,15 +3,15 @@
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.evaluation.hard_cases import scene
+from derain.scan import Float32s
 
 # 3D-OutDet, as an early derain exported it.
 KEPT = Path(__file__).parents[1] / "export" / "kept" / "outdet.onnx"
 
 
-def hard_points() -> NDArray[np.float32]:
+def hard_points() -> Float32s:
     """A scene with ties, several rows at a position, and rows of every kind that is invalid.
 
     Returns:
@@ -43,7 +43,7 @@ def hard_points() -> NDArray[np.float32]:
     return generator.permutation(points)
 
 
-def hard_scans() -> dict[str, NDArray[np.float32]]:
+def hard_scans() -> dict[str, Float32s]:
     """Scans by what is hard about them."""
     hard = hard_points()
     one_intensity, unknown = hard.copy(), hard.copy()

@@ -7,7 +7,8 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from derain.scan import Float32s
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "ros2_node"
 
@@ -127,7 +128,7 @@ class Node:
         return SimpleNamespace(now=lambda: now)
 
 
-def message_of(points: NDArray[np.float32], height: int = 1, gap: int = 0) -> PointCloud2:
+def message_of(points: Float32s, height: int = 1, gap: int = 0) -> PointCloud2:
     """A message of (N, 4) points in rows, each followed by a gap of so many bytes."""
     table = np.frombuffer(np.random.default_rng(0).bytes(len(points) * 23), POINT).copy()
     names = ("x", "y", "z", "intensity")

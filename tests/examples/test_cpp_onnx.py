@@ -6,19 +6,19 @@ from pathlib import Path
 import numpy as np
 import onnx
 import pytest
-from numpy.typing import NDArray
 
 from derain.default import default_model
 from derain.evaluation.hard_cases import scene
 from derain.export.onnx_file import with_metadata
 from derain.export.runtime import Derainer
+from derain.scan import Float32s
 
 from .cpp import Program
 from .hard_points import KEPT, SCANS
 
 
 def judged_alike(
-    derain_onnx: Program, folder: Path, model: Path, scans: Iterable[NDArray[np.float32]]
+    derain_onnx: Program, folder: Path, model: Path, scans: Iterable[Float32s]
 ) -> None:
     """Judges scans by the program and by derain, and compares all that they write."""
     paths = {folder / f"{number}.bin": points for number, points in enumerate(scans)}

@@ -12,12 +12,12 @@ from types import ModuleType
 import numpy as np
 import onnx
 import pytest
-from numpy.typing import NDArray
 
 from derain.default import default_model
 from derain.evaluation.hard_cases import scene
 from derain.export.onnx_file import with_metadata
 from derain.export.runtime import Derainer
+from derain.scan import Float32s
 from derain.spec import Spec
 from derain.views.back_projection import BACK_PROJECTIONS
 from derain.views.view import VIEWS
@@ -38,7 +38,7 @@ def reader() -> Iterator[ModuleType]:
         del sys.modules["onnx_reader"]
 
 
-def agree(reader: ModuleType, path: Path, *scans: NDArray[np.float32]) -> None:
+def agree(reader: ModuleType, path: Path, *scans: Float32s) -> None:
     """Judges scans by the reader and by derain, and compares the answers."""
     theirs, ours = reader.Model(str(path)), Derainer(path, threads=1)
     for points in scans:

@@ -6,11 +6,10 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
-from derain.scan import Bools
+from derain.scan import Bools, Float32s
 
 from .hard_points import KEPT
 from .made_up_ros import (
@@ -107,7 +106,7 @@ def calling_rain(patch: pytest.MonkeyPatch, ros2_node: ModuleType, rain: Bools) 
     )
 
 
-def level_after(ros2_node: ModuleType, points: NDArray[np.float32], dry: str = "") -> str:
+def level_after(ros2_node: ModuleType, points: Float32s, dry: str = "") -> str:
     """The level that the node reports after a cloud."""
     node = started(ros2_node, dry=dry)
     node.subscriptions["points"][1](message_of(points))

@@ -2,16 +2,15 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import onnx
 import pytest
-from numpy.typing import NDArray
 
 from derain.export.model_file import ModelFile
 from derain.export.runtimes.onnx_runtime import OnnxRuntimeSession
 from derain.export.runtimes.session import RUNTIMES, Session, TensorType
+from derain.scan import Array, Float32s
 
 # What the runtime "rainy" adds to the score of rain, by its precisions.
 RAINY = {"float32": 0.0, "bf16": 0.01, "int2": 1000.0}
@@ -35,7 +34,7 @@ class RainySession(Session):
     def outputs(self) -> list[TensorType]:
         return self.usual.outputs
 
-    def run(self, inputs: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
+    def run(self, inputs: Mapping[str, Array]) -> Float32s:
         return self.usual.run(inputs) + np.float32([0, RAINY[self.settings[1]]])
 
 

@@ -16,7 +16,6 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
@@ -24,7 +23,7 @@ from derain.export.runtime import Derainer
 from derain.filters import DROR
 from derain.models.base import DerainingModule
 from derain.models.checkpoint import load_model
-from derain.scan import Scan
+from derain.scan import Float32s, Scan
 from derain.sources.frame import MemoryFrame
 from derain.sources.judgement import Judgement
 from derain.sources.source import Frames
@@ -42,7 +41,7 @@ def derainer(onnx_model) -> Derainer:
     return Derainer(onnx_model, threads=1)
 
 
-def from_pytorch(model: DerainingModule, scan: Scan) -> NDArray[np.float32]:
+def from_pytorch(model: DerainingModule, scan: Scan) -> Float32s:
     view = model.spec.make_view()(scan)
     inputs = {title: torch.from_numpy(array) for title, array in view.inputs().items()}
     with torch.inference_mode():

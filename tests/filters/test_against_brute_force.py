@@ -5,16 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
-from numpy.typing import NDArray
 
 from derain.evaluation.hard_cases import scene
 from derain.filters import DROR, DSOR, ROR, SOR, SSR, FilterDerainer, PointFilter, filter_view
 from derain.filters.radius_filters import has_few_neighbours
-from derain.scan import Floats, Ints, Scan
+from derain.scan import Float32s, Floats, Ints, Scan
 from derain.views.morton import MOST_COPIES
 
 
-def with_few_copies(cloud: NDArray[np.float32]) -> NDArray[np.float32]:
+def with_few_copies(cloud: Float32s) -> Float32s:
     """The rows of a cloud but those of which there are more than copies of one point."""
     _, place, times = np.unique(cloud[:, :3], axis=0, return_inverse=True, return_counts=True)
     return cloud[times[place.reshape(-1)] <= MOST_COPIES]
@@ -39,13 +38,13 @@ counts = st.integers(2, 12)
 UNCLEAR = 1e-6
 
 
-def pairs(xyz: NDArray[np.float32]) -> Floats:
+def pairs(xyz: Float32s) -> Floats:
     """Distances of all pairs, float64 (M, M)."""
     exact = xyz.astype(np.float64)
     return np.sqrt(np.square(exact[:, None] - exact[None]).sum(axis=2))
 
 
-def positions(scan: Scan) -> tuple[NDArray[np.float32], Ints, Ints]:
+def positions(scan: Scan) -> tuple[Float32s, Ints, Ints]:
     """Distinct valid positions, the first row at each, and the position of each valid row."""
     valid = np.flatnonzero(scan.valid)
     xyz, first, inverse = np.unique(scan.xyz[valid], axis=0, return_index=True, return_inverse=True)
@@ -66,7 +65,7 @@ def check(scan: Scan, filter_: PointFilter, value: Floats, limit: Floats) -> Non
     assert not (wrong & ~unclear).any()
 
 
-def mean_of_nearest(xyz: NDArray[np.float32], neighbours: int) -> Floats:
+def mean_of_nearest(xyz: Float32s, neighbours: int) -> Floats:
     return np.sort(pairs(xyz), axis=1)[:, 1:neighbours].mean(axis=1)
 
 

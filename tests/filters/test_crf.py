@@ -16,7 +16,7 @@ from derain.filters.airborne import fit_rain_bounds
 from derain.filters.crf import _along_the_sweep
 from derain.filters.ground import find_ground
 from derain.filters.random_field import decide_sequentially
-from derain.scan import Bools, Floats, Ints, Scan
+from derain.scan import Bools, Float32s, Floats, Ints, Scan
 
 # Nearer than this to a limit, rounding may decide.
 UNCLEAR = 1e-9
@@ -33,7 +33,7 @@ class Reference:
         is_clear: Whether no verdict hangs on rounding, or on which of two equals comes first.
     """
 
-    def __init__(self, points: NDArray[np.float32], neighbours: int) -> None:
+    def __init__(self, points: Float32s, neighbours: int) -> None:
         self.xyz, self.intensity = points[:, :3].astype(np.float64), points[:, 3]
         self.range = np.linalg.norm(self.xyz, axis=1)
         apart = np.linalg.norm(self.xyz[:, None] - self.xyz[None], axis=2)
@@ -152,7 +152,7 @@ def test_the_fitted_variant_does_the_same_within_its_own_bounds(seed) -> None:
     ground = find_ground(scan.xyz)
     reference = Reference(scene(1200, seed), 8)
 
-    def around(rows: Ints) -> tuple[Ints, NDArray[np.float32]]:
+    def around(rows: Ints) -> tuple[Ints, Float32s]:
         return reference.near[rows], reference.apart[rows].astype(np.float32)
 
     above = ground.is_above(scan.xyz)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import torch
 from lightning.pytorch.callbacks import ModelCheckpoint
-from numpy.typing import NDArray
 
 from derain.datamodules.augmentation import Augmentation
 from derain.files.labels import write_labels
@@ -19,7 +18,7 @@ from derain.models.lisnownet import LiSnowNet
 from derain.models.measured import MONITOR
 from derain.models.outdet import OutDet
 from derain.models.salsanext import SalsaNext
-from derain.scan import Bools
+from derain.scan import Bools, Float32s
 from derain.sources.training_record import record_of_scans
 
 from .conftest import assert_same
@@ -40,7 +39,7 @@ def test_without_rain_to_validate_on_the_best_epoch_is_that_of_the_least_loss(
     write_labels(tmp_path / "3.label", np.zeros(300, int))
 
     class Loud(OutDet):
-        def probabilities(self, *arguments: Any) -> list[NDArray[np.float32]]:
+        def probabilities(self, *arguments: Any) -> list[Float32s]:
             return [np.full_like(each, called) for each in super().probabilities(*arguments)]
 
     trainer = make_trainer(epochs=2, num_sanity_val_steps=1)

@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from contents import contents
-from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files import read_scan
@@ -21,7 +20,7 @@ from derain.files.labels import read_labels
 from derain.jobs.job import job_status
 from derain.jobs.shard import Shard
 from derain.jobs.workers import WorkerPool
-from derain.scan import Bools, Scan
+from derain.scan import Bools, Float32s, Scan
 from derain.simulation import sequence
 from derain.simulation.campaign import Campaign
 from derain.simulation.classes import TrackClass
@@ -195,7 +194,7 @@ def test_neither_range_nor_intensity_separates_rain_in_a_street(open3d, tmp_path
     assert best_bound(np.concatenate([scan.intensity for scan in found]), rain) < 0.6
 
 
-def best_bound(values: NDArray[np.float32], rain: Bools) -> float:
+def best_bound(values: Float32s, rain: Bools) -> float:
     """The greatest IoU of all bounds below which points are called rain."""
     below = rain[np.argsort(values)].cumsum()
     rows = np.arange(1, len(rain) + 1)

@@ -2,16 +2,14 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from derain.evaluation.hard_cases import hard_cases
 from derain.files import read_scan
 from derain.files.columns import scan_of
-from derain.scan import Bools, Scan
+from derain.scan import Array, Bools, Scan
 from derain.simulation.classes import TrackClass
 from derain.simulation.rain import DROP_REFLECTIVITY, farthest_visible_drop
 from derain.simulation.rain_field import UniformRain
@@ -50,7 +48,7 @@ def in_place(wet: Scan) -> Bools:
     return np.append(True, np.diff(wet.fields["number"]) > 0).cumprod().astype(bool)
 
 
-def equal(first: NDArray[Any], second: NDArray[Any]) -> bool:
+def equal(first: Array, second: Array) -> bool:
     """Whether two columns are the same, bit for bit."""
     floating = first.dtype.kind == "f"
     return first.dtype == second.dtype and np.array_equal(first, second, equal_nan=floating)

@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from derain.files.extrinsics import read_extrinsics
 from derain.files.labels import instance, read_labels
-from derain.scan import Floats, class_ids
+from derain.scan import Float32s, Floats, class_ids
 from derain.simulation.campaign import Campaign, Drive
 from derain.simulation.classes import TrackClass
 from derain.simulation.radar import Radar
@@ -36,7 +35,7 @@ def times(folder: Path) -> Floats:
     return np.array(table(folder / "metadata.csv")["timestamp"], float)
 
 
-def points(path: Path) -> NDArray[np.float32]:
+def points(path: Path) -> Float32s:
     return np.fromfile(path, "<f4").reshape(-1, 4)
 
 

@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from derain.errors import ScanWarning
 from derain.evaluation.hard_cases import scene
@@ -13,7 +12,7 @@ from derain.export.methods import load_method
 from derain.export.runtime import Derainer
 from derain.filters import DROR, FilterDerainer
 from derain.recordings.persistence import PersistenceDerainer
-from derain.scan import Scan
+from derain.scan import Float32s, Scan
 from derain.sources.judgement import Judgement
 from derain.views.scan_issues import ScanIssue
 
@@ -26,7 +25,7 @@ def warned(judge: Callable[[], object]) -> list[warnings.WarningMessage]:
     return [each for each in caught if each.category is ScanWarning]
 
 
-def in_millimetres() -> NDArray[np.float32]:
+def in_millimetres() -> Float32s:
     points = scene(600)
     points[:, :3] *= 1000
     return points

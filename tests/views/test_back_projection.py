@@ -7,16 +7,15 @@ import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
-from derain.scan import Bools
+from derain.scan import Bools, Float32s
 from derain.views.back_projection import CHUNK, ProjectedPoints, copy, nearest_range, vote
 
 SHAPES = st.tuples(st.integers(1, 7), st.integers(1, 9))
 
 
 @st.composite
-def projections(draw: st.DrawFn) -> tuple[ProjectedPoints, NDArray[np.float32]]:
+def projections(draw: st.DrawFn) -> tuple[ProjectedPoints, Float32s]:
     """Points on a small grid with few ranges, hence many ties, and a score per pixel."""
     height, width = draw(SHAPES)
     count = draw(st.integers(0, 60))
@@ -52,7 +51,7 @@ def window(points: ProjectedPoints, pixel: int) -> list[tuple[int, int]]:
     return [(squared, number) for squared, _, number in sorted(found)]
 
 
-def nearest_range_by_hand(points: ProjectedPoints, score: NDArray[np.float32]) -> list[float]:
+def nearest_range_by_hand(points: ProjectedPoints, score: Float32s) -> list[float]:
     shown, result = points.nearest.ravel(), []
     for pixel, distance in zip(points.pixel, points.range, strict=True):
         candidates = [number for _, number in window(points, pixel)]
@@ -60,7 +59,7 @@ def nearest_range_by_hand(points: ProjectedPoints, score: NDArray[np.float32]) -
     return result
 
 
-def vote_by_hand(points: ProjectedPoints, score: NDArray[np.float32]) -> list[float]:
+def vote_by_hand(points: ProjectedPoints, score: Float32s) -> list[float]:
     shown, result = points.nearest.ravel(), []
     total = sum(math.exp(-(a * a + b * b) / 2) for a in range(-2, 3) for b in range(-2, 3))
     for pixel, distance in zip(points.pixel, points.range, strict=True):
@@ -106,7 +105,7 @@ def test_away_from_the_borders_the_vote_is_the_published_one() -> None:
     np.testing.assert_array_equal(ours > 0.5, theirs)
 
 
-def published_vote(points: ProjectedPoints, score: NDArray[np.float32]) -> Bools:
+def published_vote(points: ProjectedPoints, score: Float32s) -> Bools:
     """RangeNet++'s k-NN search as published: class 0 is void, 1 is other and 2 is rain."""
     shown = torch.from_numpy(np.where(np.isinf(points.nearest), -1, points.nearest))
     classes = torch.from_numpy(np.where(score > 0.5, 2, 1)).reshape(shown.shape)

@@ -5,9 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
-from numpy.typing import NDArray
 
-from derain.scan import Ints
+from derain.scan import Float32s, Ints
 from derain.simulation.sensor import unit_vectors
 from derain.views.direction_table import BINS, BORDER_MARGIN, UNSURE_BELOW, height_of, turn_of
 from derain.views.directions import directions
@@ -24,7 +23,7 @@ GRIDS = [
 ]
 
 
-def computed(grid: SphericalGrid, xyz: NDArray[np.float32]) -> Ints:
+def computed(grid: SphericalGrid, xyz: Float32s) -> Ints:
     """Pixels by the trigonometry of every point in float64; -1 outside."""
     azimuth, inclination = directions(xyz)
     ascending = np.array(grid.edges[::-1])
@@ -38,7 +37,7 @@ def computed(grid: SphericalGrid, xyz: NDArray[np.float32]) -> Ints:
 
 
 @st.composite
-def points_at_borders(draw: st.DrawFn) -> tuple[SphericalGrid, NDArray[np.float32]]:
+def points_at_borders(draw: st.DrawFn) -> tuple[SphericalGrid, Float32s]:
     """Points on borders between rows, or columns, or so near that few floats lie between."""
     grid = draw(st.sampled_from(GRIDS))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
@@ -80,7 +79,7 @@ def test_rounding_carries_no_point_across_a_border_that_hardly_lies_in_its_bin()
     np.testing.assert_array_equal(grid.pixel(xyz), computed(grid, xyz))
 
 
-def scattered(count: int) -> NDArray[np.float32]:
+def scattered(count: int) -> Float32s:
     """Points around a sensor, at most 70 degrees up or down."""
     rng = np.random.default_rng(0)
     xyz = rng.normal(size=(count, 3)) * [1, 1, 0.2]

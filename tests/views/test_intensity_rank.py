@@ -4,13 +4,12 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
-from numpy.typing import NDArray
 
-from derain.scan import Scan
+from derain.scan import Float32s, Scan
 from derain.views.intensity_rank import INTENSITY_RANKS, intensity_rank
 
 
-def of_intensities(intensity: NDArray[np.float32] | None, points: int) -> Scan:
+def of_intensities(intensity: Float32s | None, points: int) -> Scan:
     return Scan(np.ones((points, 3), np.float32), intensity=intensity)
 
 

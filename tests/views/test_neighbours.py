@@ -5,10 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
-from numpy.typing import NDArray
 
 from derain.evaluation.hard_cases import scene
-from derain.scan import Ints, Scan
+from derain.scan import Float32s, Ints, Scan
 from derain.views.candidates import Bound, Candidates
 from derain.views.channels import filled_values
 from derain.views.morton import distinct_positions, distinct_rows, first_rows, morton_code
@@ -26,7 +25,7 @@ scattered = hnp.arrays(
 )
 
 
-def brute_force(xyz: NDArray[np.float32], k: int) -> tuple[Ints, NDArray[np.float32]]:
+def brute_force(xyz: Float32s, k: int) -> tuple[Ints, Float32s]:
     squared = ((xyz[:, None].astype(np.float64) - xyz[None].astype(np.float64)) ** 2).sum(axis=2)
     rank = np.broadcast_to(np.arange(len(xyz)), squared.shape)
     order = np.lexsort((rank, squared))[:, : min(k, len(xyz))]

@@ -4,13 +4,13 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
-from numpy.typing import NDArray
 from scipy.special import softmax
 
+from derain.scan import Float32s
 from derain.views.probability import probability_of_rain
 
 
-def logits(reach: float) -> st.SearchStrategy[NDArray[np.float32]]:
+def logits(reach: float) -> st.SearchStrategy[Float32s]:
     return hnp.arrays(
         np.float32,
         st.tuples(st.integers(0, 20), st.just(2)),

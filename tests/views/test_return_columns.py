@@ -1,20 +1,18 @@
 """Returns are read from a file's columns, which agree with directions."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from derain.files import read_scan
-from derain.scan import Scan
+from derain.scan import Array, Scan
 from derain.views.return_columns import stated_returns
 from derain.views.returns import pair_returns
 
 from ..two_returns import Recording
 
 
-def with_columns(recording: Recording, **columns: NDArray[Any]) -> Scan:
+def with_columns(recording: Recording, **columns: Array) -> Scan:
     return Scan(recording.xyz, fields=columns)
 
 
@@ -24,39 +22,39 @@ def numbers(recording: Recording) -> NDArray[np.uint8]:
     return (1 + farther).astype(np.uint8)
 
 
-def of_las(recording: Recording) -> dict[str, NDArray[Any]]:
+def of_las(recording: Recording) -> dict[str, Array]:
     counts = (1 + recording.two).astype(np.uint8)
     return {"return_number": numbers(recording), "number_of_returns": counts}
 
 
-def of_las_bits(recording: Recording) -> dict[str, NDArray[Any]]:
+def of_las_bits(recording: Recording) -> dict[str, Array]:
     counts = (1 + recording.two).astype(np.uint8)
     flags = np.zeros(len(counts), np.uint8)
     return {"bit_fields": numbers(recording) | counts << 4, "classification_flags": flags}
 
 
-def of_old_las_bits(recording: Recording) -> dict[str, NDArray[Any]]:
+def of_old_las_bits(recording: Recording) -> dict[str, Array]:
     counts = (1 + recording.two).astype(np.uint8)
     return {"bit_fields": numbers(recording) | counts << 3 | 0b01000000}
 
 
-def of_nebula(recording: Recording) -> dict[str, NDArray[Any]]:
+def of_nebula(recording: Recording) -> dict[str, Array]:
     first = np.where(recording.ray % 2, 4, 9)
     kind = np.where(numbers(recording) == 2, np.where(recording.ray % 2, 10, 5), first)
     return {"return_type": np.where(recording.two, kind, 6).astype(np.uint8)}
 
 
-def of_autoware(recording: Recording) -> dict[str, NDArray[Any]]:
+def of_autoware(recording: Recording) -> dict[str, Array]:
     first = np.where(recording.ray % 2, 3, 5)
     kind = np.where(numbers(recording) == 2, np.where(recording.ray % 2, 6, 4), first)
     return {"return_type": np.where(recording.two, kind, 7).astype(np.uint8)}
 
 
-def of_livox(recording: Recording) -> dict[str, NDArray[Any]]:
+def of_livox(recording: Recording) -> dict[str, Array]:
     return {"tag": (numbers(recording) - 1 << 4 | recording.ray % 16).astype(np.uint8)}
 
 
-def of_echoes(recording: Recording) -> dict[str, NDArray[Any]]:
+def of_echoes(recording: Recording) -> dict[str, Array]:
     return {"Echo": numbers(recording).astype(np.float32)}
 
 

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from derain import InputError, Scan
 from derain.files import DEFAULT_COLUMNS, read_scan, write_scan
 from derain.files.formats.binary import Binary
+from derain.scan import Float32s
 
 FIVE = (*DEFAULT_COLUMNS, "ring")
 SIX = (*FIVE, "time")
@@ -19,7 +19,7 @@ def file(tmp_path) -> Path:
     return tmp_path / "scan.bin"
 
 
-def street(points: int, width: int, azimuth: float = np.pi) -> NDArray[np.float32]:
+def street(points: int, width: int, azimuth: float = np.pi) -> Float32s:
     """A flat street with walls, seen from 1.7 m above: x y z intensity ring time ... (N, width)."""
     generator = np.random.default_rng(width)
     distance = generator.uniform(2, 60, points)

@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.files import read_scan
 from derain.files.documents import Entry
 from derain.models.lisnownet.selection_rule import SelectionRule, otsu
-from derain.scan import Scan
+from derain.scan import Float32s, Scan
 
 HARD_CASES = dict(hard_cases(largest=5000))
 
@@ -114,7 +113,7 @@ def test_what_is_stated_is_not_fitted() -> None:
     assert one.ground != -1.8
 
 
-def two_groups(low: float, high: float, share: float = 0.1) -> NDArray[np.float32]:
+def two_groups(low: float, high: float, share: float = 0.1) -> Float32s:
     """Positive numbers about two values, ten times as high or low at most, and negative ones."""
     rng = np.random.default_rng(0)
     centre = np.where(rng.random(5000) < share, high, low)
