@@ -33,11 +33,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     require("demo", *TRAINING_LIBRARIES, *EXPORT_LIBRARIES, OPTUNA, OPEN3D)
-    from derain.workflows.demo import DemoConfig, run_demo
-
     out, epochs = arguments.out, arguments.epochs
     if arguments.scan is not None:
         named_frames([arguments.scan], arguments.columns)[0].read()  # refuses what cannot be read
+    from derain.workflows.demo import DemoConfig, run_demo
+
     settings = {} if epochs is None else {"trainer.max_epochs": epochs}
     print(f"Simulated rain, from streets to a table. Everything goes to {out}/\n")
     config = DemoConfig(out, settings=settings, scan=arguments.scan, columns=arguments.columns)

@@ -1,5 +1,6 @@
 """The demonstration: simulated rain, three networks, and a comparison with other methods."""
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -8,7 +9,7 @@ from typing import Any
 from derain.datamodules.labelled import card_of, labelled_scans, rain_rates
 from derain.datamodules.scan_data import Loading, ScanData
 from derain.default import DEFAULT
-from derain.errors import InputError
+from derain.errors import InputError, printable
 from derain.example import EXAMPLE, Truth
 from derain.export.bench.bench import Bench, bench
 from derain.export.bench.cost import Effort
@@ -127,7 +128,7 @@ def _tune(config: DemoConfig, data: ScanData, steps: Steps) -> None:
     steps.begin(f"Tuning: {TRIALS} trials of the filter dsor")
     frames = data.frames("validation")
     tuned = tune_filter_on("dsor", data, frames, TRIALS)
-    command = f"derain tune dsor --data {config.data} --out {config.tuned}"
+    command = _command("tune", "dsor", "--data", config.data, "--out", config.tuned)
     write_parameters(config.tuned, "dsor", tuned.parameters, command)
     steps.end(f"IoU {tuned.iou:.4f} on {len(frames)} scans, {tuned.default_iou:.4f} by default")
 
@@ -205,12 +206,16 @@ def _compare(config: DemoConfig, data: ScanData, steps: Steps) -> Bench:
         rain_rates=rain_rates([config.data], None),
         **asdict(config.effort),
     )
-    quoted = " ".join(f"'{name}'" if " " in name else name for name in names)
-    command = f"derain bench --data {config.data} --out {out} --methods {quoted}"
+    command = _command("bench", "--data", config.data, "--out", out, "--methods", *names)
     found = replace(found, facts={**found.facts, "command": command})
     found.write(out)
     steps.end(str(out / "bench.md"))
     return found
+
+
+def _command(*words: str | Path) -> str:
+    """A command of derain that repeats a step, as a shell takes it."""
+    return printable(shlex.join(["derain", *map(str, words)]))
 
 
 class Watch(CleaningObserver):

@@ -1,6 +1,7 @@
 """The demonstration shows its steps, and leaves the files that it names."""
 
 import re
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,7 @@ def small(open3d, here, short_proof) -> DemoConfig:
     """Three streets of one scan each, one network for one epoch, and two methods beside it."""
     Path("sensor.yaml").write_text(yaml.safe_dump({"rows": 16, "columns": 60}))
     return DemoConfig(
-        Path("demo"),
+        Path("my demo"),
         streets=Campaign(1, 1, 1, scans=1, rain_rates=(50.0,), sensor="sensor.yaml"),
         networks=("3D-OutDet",),
         others=("default", "none"),
@@ -63,6 +64,10 @@ def test_every_step_is_shown_and_leaves_its_files(small) -> None:
     kept = read_scan(out / "cleaned" / scan.name)
     np.testing.assert_array_equal(kept.xyz, read_scan(scan).xyz[~rain])
     assert list(out.glob("runs/outdet_simulated/version_0/events.out.tfevents.*"))
+
+    tuned_by = shlex.split((out / "dsor.yaml").read_text().splitlines()[0])
+    for words in (tuned_by, shlex.split(bench.facts["command"])):
+        assert words[words.index("--data") + 1] == "my demo/simulated"
 
 
 def test_the_model_that_comes_with_derain_cleans_your_own_scans(tmp_path, capsys) -> None:
