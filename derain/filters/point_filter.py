@@ -82,6 +82,9 @@ class PointFilter(ABC):
     def __post_init__(self) -> None:
         for parameter in fields(self):
             value = getattr(self, parameter.name)
+            if isinstance(value, np.generic):  # records and fingerprints hold primitives
+                value = value.item()
+                object.__setattr__(self, parameter.name, value)
             if remedy := _remedy(parameter, value):
                 raise InputError(self.name, f"{parameter.name} is {shown(value)}", remedy)
 

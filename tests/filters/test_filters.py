@@ -94,6 +94,12 @@ def test_a_filter_is_found_by_its_name_and_takes_its_parameters() -> None:
         assert kind.HELP.splitlines() == [kind.HELP]
 
 
+def test_a_filter_of_numbers_of_numpy_is_the_same_as_one_of_numbers() -> None:
+    of_numpy = DSOR(neighbours=np.int64(7), range_multiplier=np.float32(0.5))
+    plain = DSOR(neighbours=7, range_multiplier=0.5)
+    assert FilterDerainer(of_numpy).fingerprint() == FilterDerainer(plain).fingerprint()
+
+
 def test_a_filter_is_called_what_it_is_registered_by_and_its_numbers_are_checked(
     monkeypatch,
 ) -> None:
