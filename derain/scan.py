@@ -64,7 +64,7 @@ class Scan:
     """One point cloud, in the order of its file; rows are never dropped or reordered.
 
     A scan copies the arrays that it is given, so that a buffer may be filled again while scans made
-    of it are in use.
+    of it are in use. What a masked array masks is NaN.
 
     Example:
         >>> scan = Scan.of(np.array([[8.0, 6.0, 0.0, 0.5], [0.0, 0.0, 0.0, 0.0]]))
@@ -160,7 +160,7 @@ class Scan:
             raise InputError(given, "a path is not an array of points", "Use derain.read_scan.")
         remedy = "Give an array of shape (N, 4): a row for each point."
         try:
-            array = np.asarray(points)
+            array = np.asarray(np.ma.filled(points, np.nan))
         except (TypeError, ValueError, RuntimeError) as error:
             reason = f"points cannot be converted to an array ({reason_of(error)})"
             raise InputError(name, reason, remedy) from error
@@ -370,7 +370,7 @@ def class_ids(label: NDArray[Any]) -> Ints:
 
 def _copied_to_float32(values: NDArray[Any]) -> NDArray[np.float32]:
     with np.errstate(over="ignore", invalid="ignore"):
-        return np.array(values, np.float32, order="C")
+        return np.array(np.ma.filled(values, np.nan), np.float32, order="C")
 
 
 # What makes a column of a scan of an array that is given.

@@ -119,6 +119,12 @@ def test_an_array_becomes_a_scan_of_its_first_four_columns() -> None:
     assert Scan.of(points[:, :3]).intensity is None
 
 
+def test_what_a_masked_array_masks_cannot_be_judged() -> None:
+    points = np.ma.masked_less(np.arange(1.0, 13.0).reshape(3, 4), 5)
+    for scan in (Scan.of(points), Scan(points[:, :3], points[:, 3])):
+        assert scan.valid.tolist() == [False, True, True]
+
+
 @pytest.mark.parametrize("shape", [(0,), (4,), (5, 2), (2, 4, 4), (), (4, 100)])
 def test_an_array_that_is_not_rows_of_points_is_refused(shape) -> None:
     with pytest.raises(InputError, match=r"mine: points have shape .*\. Give an array"):
