@@ -50,7 +50,7 @@ class SharedTrials:
         self._storage = storage
         self._study_id = storage.get_study_id_from_name(name)
         self._distributions = dict(distributions)
-        sampler = optuna.samplers.TPESampler(seed=seed)
+        sampler = optuna.samplers.TPESampler(seed=seed % 2**32)  # it takes no larger ones
         self._in_memory = optuna.create_study(direction="maximize", sampler=sampler)
         self._in_memory.enqueue_trial(dict(first))
         # How many trials are drawn here, and those of them whose value is not known yet.

@@ -33,7 +33,14 @@ from pathlib import Path
 
 from derain.cli import unit_options
 from derain.cli.method_options import add_runtime, list_methods, runtime_of
-from derain.cli.options import add_data, add_threads, command_line, count, labelled
+from derain.cli.options import (
+    add_data,
+    add_seed,
+    add_threads,
+    command_line,
+    count,
+    labelled,
+)
 from derain.cli.outputs import print_lines
 from derain.cli.parser import Parser
 from derain.datamodules.labelled import LabelledScans, rain_rates
@@ -86,7 +93,7 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument(
         "--repeats", type=count, default=3, help="timed runs of each scan (default: %(default)s)"
     )
-    parser.add_argument("--seed", type=int, default=0, help="random seed (default: 0)")
+    add_seed(parser)
     unit_options.add_units(parser, workers="1")
 
 

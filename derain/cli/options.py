@@ -27,8 +27,8 @@ def count(text: str, least: int = 1) -> int:
     return value
 
 
-def threads(text: str) -> int:
-    """A number of threads; 0 stands for every core."""
+def none_or_more(text: str) -> int:
+    """A whole number of 0 or more."""
     return count(text, least=0)
 
 
@@ -70,7 +70,14 @@ def file_named(*suffixes: str) -> Callable[[str], Path]:
 
 def add_threads(parser: argparse.ArgumentParser) -> None:
     """Declares how many threads a command may use."""
-    parser.add_argument("--threads", type=threads, default=0, help="threads (default: all cores)")
+    parser.add_argument(
+        "--threads", type=none_or_more, default=0, help="threads (default: all cores)"
+    )
+
+
+def add_seed(parser: argparse.ArgumentParser) -> None:
+    """Declares ``--seed``."""
+    parser.add_argument("--seed", type=none_or_more, default=0, help="random seed (default: 0)")
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:

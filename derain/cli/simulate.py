@@ -55,7 +55,7 @@ import numpy as np
 from tqdm import tqdm
 
 from derain.cli import outputs
-from derain.cli.options import add_columns, count
+from derain.cli.options import add_columns, add_seed, count
 from derain.cli.unit_options import add_executor, add_shard, executor_of, shard_of
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS
@@ -105,7 +105,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--sensor",
         help="name of a packaged sensor, or YAML file (default: mems_256, with --on spinning_64)",
     )
-    parser.add_argument("--seed", type=int, default=0, help="random seed (default: %(default)s)")
+    add_seed(parser)
     _add_data_set_options(parser.add_argument_group("a data set"))
     _add_scan_options(parser.add_argument_group("rain on scans"))
 
@@ -164,8 +164,6 @@ def _add_scan_options(group: "argparse._ArgumentGroup") -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    if arguments.seed < 0:
-        raise InputError("--seed", f"{arguments.seed} is negative", "Give 0 or more.")
     if arguments.on is not None:
         _refuse((*DATA_SET_DEFAULTS, "world"), arguments, needs="without --on")
         return _rain_on_scans(arguments)

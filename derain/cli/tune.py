@@ -52,7 +52,7 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument(
         "--trials", type=options.count, default=100, help="trials for a filter (default: 100)"
     )
-    parser.add_argument("--seed", type=int, default=0, help="random seed (default: 0)")
+    options.add_seed(parser)
     parser.add_argument(
         "--candidates",
         type=options.share,

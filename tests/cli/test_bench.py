@@ -224,6 +224,11 @@ def test_the_papers_tables_need_a_data_set_with_a_split(refused, root, tmp_path)
     assert "has no split, which the paper's tables need. Name the root." in line
 
 
+def test_a_seed_that_there_is_not_is_refused(refused, root, tmp_path) -> None:
+    data = ("bench", "--data", root, "--methods", "all", "--out", tmp_path / "out")
+    assert "--seed: -1 is less than 0" in refused(*data, "--seed", "-1")
+
+
 def test_a_folder_that_cannot_be_written_is_refused_before_any_work(
     refused, root, monkeypatch
 ) -> None:

@@ -125,7 +125,7 @@ def test_columns_and_a_picture(succeed, tmp_path, saved_figures) -> None:
         (["--speed", "13", "--on", "."], "--speed: works only without --on"),
         (["--rain", "-1"], "rain rate: -1.0 mm/h is no rain rate. Give up to 2000 mm/h."),
         (["--rain", "nan"], "--rain: nan is not a number."),
-        (["--seed", "-1"], "--seed: -1 is negative. Give 0 or more."),
+        (["--seed", "-1"], "--seed: -1 is less than 0"),
         (["--sensor", "mars"], "mars: no such sensor. Give a YAML file or one of front_128,"),
         (["--picture"], "--picture: works only with --on. Leave it out."),
         (["--on", "x.bin"], "--rain: scans take a single rain rate. Give one, e.g. --rain 25."),

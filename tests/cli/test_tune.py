@@ -124,7 +124,7 @@ def test_the_scans_are_drawn_by_the_seed(succeed) -> None:
         return BEST.read_text().split("\n", 1)[1]  # but for the command
 
     assert tuned(1) == tuned(1)
-    assert len({tuned(seed) for seed in range(1, 5)}) > 1
+    assert len({tuned(seed) for seed in (2, 3, 4, 2**32)}) > 1
 
 
 def test_scans_without_rain_are_refused(refused, write_labelled) -> None:
