@@ -112,8 +112,8 @@ def main(arguments: argparse.Namespace) -> int:
     if or_example(path) != path:
         path = example_file()
     if len(arguments.scans) > 1 or (path.is_dir() and not is_bag(path)):
-        reason = "is more than one scan; a picture shows one"
-        raise InputError(path, reason, "Name one, or give --rerun out.rrd to see all of them.")
+        reason = "a picture shows one scan, and neither a folder nor several"
+        raise InputError(path, reason, "Name one scan, or give --rerun out.rrd to see all of them.")
     if not (arguments.out or arguments.window):
         raise InputError(path, "no output is named", "Give --out, --window or --rerun.")
     require("view", MATPLOTLIB, *((OPEN3D,) if arguments.window else ()))

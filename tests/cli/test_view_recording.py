@@ -177,7 +177,7 @@ def test_a_scan_that_cannot_be_read_is_reported_once_and_shown_empty(
             "dror: it is the title of two methods",
         ),
         (["--rerun", "out.rrd", "--out", "out.png"], "cannot be combined with --out or --window"),
-        (["--out", "out.png"], "is more than one scan"),
+        (["--out", "out.png"], "a folder"),
     ],
 )
 def test_what_cannot_be_meant_is_refused_and_nothing_is_written(
