@@ -40,7 +40,7 @@ from typing import Any
 from tqdm import tqdm
 
 from derain.cards.known import lidar_folders
-from derain.cli.options import add_columns, factor
+from derain.cli.options import add_columns, factor, read_by
 from derain.cli.outputs import folder_sink, print_lines
 from derain.errors import InputError
 from derain.fusion import LABEL_WITHIN, transfer_labels
@@ -111,7 +111,7 @@ def main(arguments: argparse.Namespace) -> int:
         sink.write(frame, None, label)
         points.update(label.tolist())
         if frame.key in radar:
-            detections = radar[frame.key].read()
+            detections = read_by(radar[frame.key], "--radar-columns")
             labelled = scan.with_label(label)
             transferred = transfer_labels(labelled, detections.xyz, arguments.within)
             radar_sink.write(radar[frame.key], None, transferred)

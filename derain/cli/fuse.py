@@ -15,9 +15,9 @@ The extrinsics are the pose of the radar in the LiDAR's frame (x forward, y left
 
   {x: 0.5, y: 0.0, z: -0.7, roll: 0, pitch: 0, yaw: 1.5}     metres and degrees
 
-or a 4 x 4 matrix. metadata.csv in each folder has one line per scan: frame (its name),
-timestamp (in seconds). A radar point gets the label of the nearest LiDAR point, or 255 (unknown) if
-none is near. A LiDAR scan without a radar frame is written alone.
+or a 4 x 4 matrix, {matrix: [[1, 0, 0, 0.5], ...]}. metadata.csv in each folder has one line per
+scan: frame (its name), timestamp (in seconds). A radar point gets the label of the nearest LiDAR
+point, or 255 (unknown) if none is near. A LiDAR scan without a radar frame is written alone.
 """
 
 import argparse
@@ -29,7 +29,7 @@ import numpy as np
 from tqdm import tqdm
 
 from derain.cards.card import load_card
-from derain.cli.options import add_columns, factor
+from derain.cli.options import add_columns, factor, read_by
 from derain.cli.outputs import folder_sink, print_lines
 from derain.errors import InputError
 from derain.files import write_scan
@@ -38,7 +38,7 @@ from derain.files.extrinsics import read_extrinsics
 from derain.files.frame_times import FRAME_COLUMNS, METADATA, read_frame_times
 from derain.files.labels import LABEL, instance, read_labels, write_labels
 from derain.fusion import LABEL_WITHIN, NO_DETECTIONS, fuse, nearest_in_time
-from derain.scan import Floats, Scan
+from derain.scan import Floats
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.sources.source import Source
@@ -116,9 +116,9 @@ def main(arguments: argparse.Namespace) -> int:
     extra = [name for name in arguments.extra.split(",") if name]
     suffix = ".npz" if extra else ".bin"
     for frame, partner in tqdm(zip(lidar, partners, strict=True), total=len(lidar), disable=None):
-        scan, label, detections = _read(frame, "--lidar-columns"), None, NO_DETECTIONS
+        scan, label, detections = read_by(frame, "--lidar-columns"), None, NO_DETECTIONS
         if partner is not None:
-            detections = _read(partner, "--radar-columns")
+            detections = read_by(partner, "--radar-columns")
         if arguments.labels is not None:
             label = read_labels(arguments.labels / f"{frame.key}{LABEL}", len(scan))
             scan = scan.with_label(label)
@@ -136,14 +136,6 @@ def main(arguments: argparse.Namespace) -> int:
 def _times(frames: Source, columns: Sequence[str]) -> Floats:
     """Times of the frames in seconds, from the metadata in their folders."""
     return read_frame_times([Path(frame.name) for frame in frames], columns)
-
-
-def _read(frame: Frame, option: str) -> Scan:
-    """Reads a frame; an error that names --columns names the option of the sensor instead."""
-    try:
-        return frame.read()
-    except InputError as error:
-        raise error.renaming_option("--columns", option) from error
 
 
 def _write_metadata(

@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING
 
 from derain.cards.card import packaged_cards
 from derain.cli.parser import number, whole
-from derain.errors import printable
+from derain.errors import InputError, printable
 from derain.files import DEFAULT_COLUMNS
 from derain.recordings.posed import ODOMETRY, STANDING
+from derain.scan import Scan
+from derain.sources.frame import Frame
 
 if TYPE_CHECKING:
     from derain.datamodules.labelled import LabelledScans
@@ -107,6 +109,18 @@ def add_columns(
         help=f"column names for {of}files without them, such as .bin "
         f"(default: {','.join(DEFAULT_COLUMNS)})",
     )
+
+
+def read_by(frame: Frame, option: str) -> Scan:
+    """Reads a frame whose columns an option names that is not ``--columns``.
+
+    Raises:
+        InputError: A scan that cannot be read; the remedy names that option.
+    """
+    try:
+        return frame.read()
+    except InputError as error:
+        raise error.renaming_option("--columns", option) from error
 
 
 def add_intensity_scale(parser: argparse.ArgumentParser, of: str = "") -> None:

@@ -109,6 +109,14 @@ def test_labels_that_came_with_the_scans_are_not_overwritten(refused) -> None:
         assert sorted(SEQUENCE.rglob("*")) == before
 
 
+def test_a_radar_frame_of_other_columns_is_refused_with_the_option_that_names_them(refused) -> None:
+    write_scan(Path("radar/000000.bin"), Scan.of(scene(21)[:, :3]))
+    line = refused(*ANNOTATE, "out", "--radar", "radar")
+    assert line.startswith("derain: radar/000000.bin: ")
+    assert "--radar-columns" in line
+    assert " --columns" not in line
+
+
 def test_a_radar_frame_of_no_scan_is_refused(refused) -> None:
     write_scan(Path("radar/000009.bin"), Scan.of(scene(20)))
     line = refused(*ANNOTATE, "out", "--radar", "radar")
