@@ -18,7 +18,13 @@ from derain.evaluation.scores import ScoredMethod, Scores, score
 from derain.export.bench.bench_entries import BenchEntry, GivenMethod, TimedMethod, bench_entries
 from derain.export.bench.cost import Effort, measure_cost
 from derain.export.bench.labelled_frames import LabelledFrames
-from derain.export.bench.report import draw_speed_error, main_table, runtimes_table, write_report
+from derain.export.bench.report import (
+    draw_speed_error,
+    failures_of,
+    main_table,
+    runtimes_table,
+    write_report,
+)
 from derain.export.bench.rows import Row, bench_rows
 from derain.export.runtime import Derainer
 from derain.export.runtimes.session import DEFAULT_RUNTIME, FLOAT32_PRECISION, Runtime
@@ -45,7 +51,7 @@ from derain.views.scan_issues import ScanIssue
 
 @dataclass(frozen=True)
 class Bench:
-    """The results of a bench; as text, its main table and the effect of other runtimes.
+    """The results of a bench; as text: its main table, what other runtimes change, and what failed.
 
     Attributes:
         rows: The results of each method, in the order of the methods.
@@ -58,8 +64,12 @@ class Bench:
 
     def __str__(self) -> str:
         changed = self.facts["runtimes"]
-        table = main_table(self.rows)
-        return f"{table}\n\n{runtimes_table(changed)}" if changed else table
+        parts = [
+            main_table(self.rows),
+            runtimes_table(changed) if changed else "",
+            failures_of(self.rows),
+        ]
+        return "\n\n".join(filter(None, parts))
 
     def __getitem__(self, title: str) -> Row:
         """The row of a method, by its title.

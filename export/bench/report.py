@@ -97,7 +97,7 @@ def as_markdown(rows: Sequence[Row], facts: Mapping[str, Any]) -> str:
     parts += ["## Milliseconds by stage, median and 95th percentile", _by_stage(rows)]
     if changed := facts.get("runtimes"):
         parts += ["## Other runtimes", runtimes_table(changed), OTHER_RUNTIMES]
-    if failures := _failures(rows):
+    if failures := failures_of(rows):
         parts += ["## Failures", failures]
     return "\n\n".join([*parts, facts["versions"]])
 
@@ -262,7 +262,8 @@ def _not_alone(rows: Sequence[Row]) -> list[str]:
     ]
 
 
-def _failures(rows: Sequence[Row]) -> str:
+def failures_of(rows: Sequence[Row]) -> str:
+    """Why methods failed, a line each; nothing where none did."""
     lines = []
     for row in rows:
         if failures := row.scores.failures:

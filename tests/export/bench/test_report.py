@@ -10,7 +10,7 @@ from matplotlib.image import imread
 
 from derain.evaluation.counts import or_none
 from derain.evaluation.scores import Scores, score
-from derain.export.bench.bench import scored_methods
+from derain.export.bench.bench import Bench, scored_methods
 from derain.export.bench.bench_entries import FILE_SIZE, BenchEntry, bench_entries
 from derain.export.bench.cost import Cost
 from derain.export.bench.labelled_frames import LabelledFrames
@@ -94,6 +94,12 @@ def test_the_tables_name_every_method_what_failed_and_what_was_not_timed_alone(r
     assert [cell.strip() for cell in main.split("|")[2:6]] == ["-", "0.000", "0.000", "0.000"]
     by_range = parts["IoU by range"].splitlines()
     assert all(line.split()[-2] == "-" for line in by_range if "dror" in line)
+
+
+def test_a_printed_bench_states_why_a_method_failed(rows) -> None:
+    text = str(Bench(rows, {"runtimes": []}))
+    assert "broken could not be timed: no room" in text
+    assert "dror could" not in text
 
 
 def test_simulated_data_are_called_so_and_one_scan_has_no_interval(rows, labelled) -> None:
