@@ -31,7 +31,7 @@ class CleanReport:
     Example:
         >>> report = derain.clean("scan.bin", derain.FilterDerainer(derain.DROR()), "cleaned")
         >>> sum(scan.rain for scan in report.scans), str(report.weather.total.visibility)
-        (20, 'not known')
+        (20, '42.9 m [29.5 to 64.7 m]')
 
     Attributes:
         scans: The cleaned scans, in order.

@@ -75,7 +75,7 @@ class WeatherMonitor:
         self._is_known = False  # whether any scan of the recording shows how far one sees
         known = options.every_scan and knows_recordings
         self._recordings = recording_numbers(source) if known else {}
-        sampled = 0 if options.every_scan or len(source) == 1 else SAMPLED_SCANS
+        sampled = 0 if options.every_scan else SAMPLED_SCANS
         self.sample = frozenset(frame.key for frame in evenly_spaced(source, sampled))
         self._reaches: list[float] = []
 
