@@ -95,13 +95,7 @@ def viewpoint_issues(scan: Scan) -> Iterator[ScanIssue]:
     """
     rows = np.flatnonzero(scan.valid)
     if len(rows) < LEAST_VALID * len(scan) or len(rows) < FEWEST_RETURNS:
-        yield from _map_issue(scan)
-        if len(rows):
-            yield ScanIssue(
-                "almost empty",
-                f"{len(rows):,} of {len(scan):,} rows are points that can be judged: too few to "
-                "check the scan (is the sensor covered, or the file cut short?)",
-            )
+        yield from [*_map_issue(scan)] or _almost_empty_issue(scan)
         return
     sample = scan.xyz.take(rows[:: -(-len(rows) // SAMPLED)], axis=0).astype(np.float64)
     position, times = _commonest(sample)
@@ -113,6 +107,16 @@ def viewpoint_issues(scan: Scan) -> Iterator[ScanIssue]:
     yield from misplaced
     if not misplaced:
         yield from [*_single_beam_issue(sample)] or _viewpoints_issue(scan)
+
+
+def _almost_empty_issue(scan: Scan) -> Iterator[ScanIssue]:
+    """Yields an issue of a scan with few points that can be judged, unless it has no rows."""
+    if len(scan):
+        yield ScanIssue(
+            "almost empty",
+            f"{np.count_nonzero(scan.valid):,} of {len(scan):,} rows are points that can be "
+            "judged: too few to check the scan (is the sensor covered, or the file cut short?)",
+        )
 
 
 def _map_issue(scan: Scan) -> Iterator[ScanIssue]:

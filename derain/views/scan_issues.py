@@ -49,7 +49,7 @@ class ScanChecker(Protocol):
 
         Args:
             scan: The scan, its intensities in the unit of the method. One without a point that can
-                be judged is not odd.
+                be judged is warned of elsewhere.
         """
 
 
