@@ -44,6 +44,7 @@ from derain.cli.unit_options import add_executor, add_shard, executor_of
 from derain.default import DEFAULT, ModelCard, ModelScore, default_model, model_card
 from derain.errors import InputError, printable
 from derain.evaluation.text_tables import number_text, plain_table
+from derain.example import or_example
 from derain.files.documents import Entry
 from derain.files.format import FORMATS
 from derain.sources.folders import named_frames
@@ -140,7 +141,7 @@ def _describe(name: str, arguments: argparse.Namespace) -> None:
     if name == DEFAULT:  # not ./default, which is a file or folder; a Path would make both the same
         _describe_default(arguments.json)
         return
-    path = in_bag(Path(name), arguments.topic)
+    path = in_bag(or_example(Path(name)), arguments.topic)
     if os.path.isdir(path) and not is_bag(path):
         _describe_folder(path, arguments)
         return

@@ -19,6 +19,7 @@ from derain.evaluation.contents import (
     rate_name,
 )
 from derain.evaluation.text_tables import plain_table
+from derain.example import example_folder
 from derain.jobs.running import Submits, Task, values
 from derain.simulation.manifest import manifest_of
 from derain.sources.frame import Frame
@@ -189,6 +190,6 @@ def _layout(folder: Path, card: DataCard | None, stated: str | None) -> Layout |
 
 def _card(folder: Path, layout: Layout | None) -> tuple[DataCard | None, CardRestsOn]:
     """The data card guessed for a folder, and the evidence for it."""
-    if manifest_of(folder):
+    if manifest_of(folder) or folder == example_folder():
         return load_card("simulated"), "manifest"
     return (None if layout is None else card_by_folders(layout, "classes")), FOLDER_NAMES

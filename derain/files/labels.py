@@ -47,7 +47,8 @@ def read_labels(path: Path, points: int) -> NDArray[np.uint32]:
             raise InputError(
                 path,
                 f"holds {size / 4:g} labels of 4 bytes for a scan of {points} points",
-                "Give the label file that belongs to the scan, and all of the scan's --columns.",
+                "Give the label file that belongs to the scan, and all of the scan's --columns; "
+                "`derain run` writes the labels of the scan that it reads, not of the cleaned one.",
             )
         return np.frombuffer(read_bytes(path, size), "<u4", points).astype(np.uint32)
 

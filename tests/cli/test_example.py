@@ -37,6 +37,15 @@ def test_run_cleans_it_and_prints_what_was_found_beside_the_truth(succeed, here)
     assert others < 0.1 * total
 
 
+def test_info_describes_it(succeed, here) -> None:
+    assert "simulated rain" in succeed("info", EXAMPLE).out
+
+
+def test_labels_of_the_scan_before_it_was_cleaned_are_explained(succeed, refused, here) -> None:
+    succeed("run", example_file(), "--out", "cleaned")
+    assert "`derain run` writes the labels of the scan that it reads" in refused("info", "cleaned")
+
+
 def test_view_draws_it(succeed, here) -> None:
     succeed("view", EXAMPLE, "--out", "figure.png")
     assert (here / "figure.png").stat().st_size > 1000
