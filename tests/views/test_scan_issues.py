@@ -110,11 +110,11 @@ def test_a_unit_that_is_not_stated_is_recognised_by_the_mean_alone(spec) -> None
     assert kinds(with_intensity(scene(300)[:, 3] * 2), unknown) == []
 
 
-def test_a_scan_without_a_point_is_not_odd(spec) -> None:
+def test_a_scan_without_a_point_has_no_other_fault(spec) -> None:
     for points in (np.zeros((0, 4), np.float32), np.full((200, 4), np.nan, np.float32)):
         for checker in (spec, SSR(), DROR(), IntensityRule(1.0, 20.0)):
-            assert kinds(Scan.of(points), checker) == []
-            assert kinds(Scan.of(points[:, :3]), checker) == []
+            assert {*kinds(Scan.of(points), checker)} <= {"almost empty"}
+            assert {*kinds(Scan.of(points[:, :3]), checker)} <= {"almost empty"}
         assert list(outside_view(Scan.of(points), np.zeros(len(points), bool), spec.data)) == []
 
 
