@@ -94,11 +94,11 @@ class Scan:
             that are not whole.
     """
 
-    xyz: NDArray[np.float32]
-    intensity: NDArray[np.float32] | None = None
+    xyz: Float32s
+    intensity: Float32s | None = None
     label: Ints | None = None
     radar: Bools | None = None
-    fields: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    fields: Mapping[str, Array] = field(default_factory=dict)
     shape: tuple[int, int] | None = None
     name: str = "scan"
     header: object = None
@@ -130,7 +130,7 @@ class Scan:
                     "Give one value per point.",
                 )
 
-    def _copied(self, title: str, convert: Callable[[Any], NDArray[Any]]) -> NDArray[Any]:
+    def _copied(self, title: str, convert: Callable[[Any], Array]) -> Array:
         """A copy of a column that was given, in the dtype that it has in a scan."""
         try:
             return convert(getattr(self, title))
@@ -142,7 +142,7 @@ class Scan:
             ) from error
 
     @classmethod
-    def of(cls, points: "Scan | NDArray[Any]", name: str = "array") -> "Scan":
+    def of(cls, points: "Scan | Array", name: str = "array") -> "Scan":
         """Makes a scan of an array of points, which is copied; a Scan comes back as it is.
 
         Args:
@@ -160,7 +160,7 @@ class Scan:
             raise InputError(given, "a path is not an array of points", "Use derain.read_scan.")
         remedy = "Give an array of shape (N, 4): a row for each point."
         try:
-            array = np.asarray(np.ma.filled(points, np.nan))
+            array = points if isinstance(points, np.ma.MaskedArray) else np.asarray(points)
         except (TypeError, ValueError, RuntimeError) as error:
             reason = f"points cannot be converted to an array ({reason_of(error)})"
             raise InputError(name, reason, remedy) from error
@@ -173,14 +173,14 @@ class Scan:
         return len(self.xyz)
 
     @cached_property  # the range view, its channel and the metrics ask for it in turn
-    def range(self) -> NDArray[np.float32]:
+    def range(self) -> Float32s:
         """Distance of every point from the sensor, float32 (N,), metres."""
         with np.errstate(invalid="ignore"):
             x, y, z = np.ascontiguousarray(self.xyz.T, dtype=np.float64)
             return to_float32(np.sqrt(x * x + y * y + z * z))
 
     @cached_property  # views, filters and warnings ask for it in turn
-    def measured_intensity(self) -> NDArray[np.float32] | None:
+    def measured_intensity(self) -> Float32s | None:
         """Intensity where the sensor measured it, float32 (N,), in the file's own unit.
 
         None where the file has none, and where its column was only filled: with one value at all
@@ -223,7 +223,7 @@ class Scan:
             return ~self.valid
         return replace(self, intensity=None).valid & ~self.valid
 
-    def channel(self, name: str) -> NDArray[np.float32] | None:
+    def channel(self, name: str) -> Float32s | None:
         """One value per point, by name.
 
         Args:
@@ -254,7 +254,7 @@ class Scan:
         values = to_float32(column)
         return np.where(np.abs(values) <= LARGEST_VALUE, values, np.float32(np.nan))
 
-    def with_label(self, label: NDArray[Any]) -> "Scan":
+    def with_label(self, label: Array) -> "Scan":
         """The same scan with semantic class ids, whole numbers (N,), which are copied.
 
         Raises:
@@ -281,14 +281,14 @@ class Scan:
         empty = self.intensity == SENTINEL
         return replace(self, intensity=np.where(empty, self.intensity, scaled))
 
-    def take(self, rows: NDArray[Any]) -> "Scan":
+    def take(self, rows: Array) -> "Scan":
         """The scan of some rows only, as an unorganised cloud.
 
         Args:
             rows: Row numbers, or a bool mask of shape (N,).
         """
 
-        def pick(column: NDArray[Any] | None) -> NDArray[Any] | None:
+        def pick(column: Array | None) -> Array | None:
             return None if column is None else column[rows]
 
         header = self.header
@@ -346,13 +346,13 @@ def has_points_as_columns(rows: int, width: int) -> bool:
     return width > max(rows, WIDEST_ARRAY)
 
 
-def to_float32(array: NDArray[Any]) -> NDArray[np.float32]:
+def to_float32(array: Array) -> Float32s:
     """Converts to contiguous float32; what is beyond its reach becomes infinite, silently."""
     with np.errstate(over="ignore", invalid="ignore"):
         return np.ascontiguousarray(array, dtype=np.float32)
 
 
-def class_ids(label: NDArray[Any]) -> Ints:
+def class_ids(label: Array) -> Ints:
     """A copy of semantic class ids, int64 (N,); of uint32, as in label files, the low 16 bits.
 
     Raises:
@@ -368,13 +368,15 @@ def class_ids(label: NDArray[Any]) -> Ints:
     return ids
 
 
-def _copied_to_float32(values: NDArray[Any]) -> NDArray[np.float32]:
+def _copied_to_float32(values: Array) -> Float32s:
     with np.errstate(over="ignore", invalid="ignore"):
-        return np.array(np.ma.filled(values, np.nan), np.float32, order="C")
+        if isinstance(values, np.ma.MaskedArray):
+            values = values.astype(np.float32).filled(np.nan)
+        return np.array(values, np.float32, order="C")
 
 
 # What makes a column of a scan of an array that is given.
-_CONVERTERS: dict[str, Callable[[Any], NDArray[Any]]] = {
+_CONVERTERS: dict[str, Callable[[Any], Array]] = {
     "xyz": _copied_to_float32,
     "intensity": _copied_to_float32,
     "label": class_ids,
@@ -382,7 +384,7 @@ _CONVERTERS: dict[str, Callable[[Any], NDArray[Any]]] = {
 }
 
 
-def _read_only(array: NDArray[Any]) -> NDArray[Any]:
+def _read_only(array: Array) -> Array:
     """The array itself if it is read-only, else a read-only copy."""
     if array.flags.writeable:
         array = array.copy()

@@ -119,8 +119,9 @@ def test_an_array_becomes_a_scan_of_its_first_four_columns() -> None:
     assert Scan.of(points[:, :3]).intensity is None
 
 
-def test_what_a_masked_array_masks_cannot_be_judged() -> None:
-    points = np.ma.masked_less(np.arange(1.0, 13.0).reshape(3, 4), 5)
+@pytest.mark.parametrize("dtype", [np.float64, np.int64])
+def test_what_a_masked_array_masks_cannot_be_judged(dtype) -> None:
+    points = np.ma.masked_less(np.arange(1, 13, dtype=dtype).reshape(3, 4), 5)
     for scan in (Scan.of(points), Scan(points[:, :3], points[:, 3])):
         assert scan.valid.tolist() == [False, True, True]
 
