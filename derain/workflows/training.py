@@ -3,6 +3,7 @@
 import argparse
 import logging
 import os
+import shutil
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -255,6 +256,19 @@ class WholeConfig(SaveConfigCallback):
             with replacing(Path(folder) / name) as temporary:
                 self.parser.save(self.config, temporary, skip_unset=False, overwrite=True)
             self.already_saved = True
+
+    def on_exception(
+        self, trainer: Trainer, pl_module: LightningModule, exception: BaseException
+    ) -> None:
+        """Removes the folder of a run that is refused before its first step: it holds no result."""
+        logger = trainer.logger
+        if trainer.global_step or not isinstance(logger, TensorBoardLogger):
+            return
+        if trainer.is_global_zero and isinstance(exception, InputError):
+            folder = Path(logger.log_dir)
+            names = sorted(path.name.split(".")[0] for path in folder.glob("*"))
+            if names == ["config", "events"]:  # and nothing of an earlier run
+                shutil.rmtree(folder)
 
 
 def run_trainer(

@@ -27,3 +27,9 @@ def test_a_log_folder_that_cannot_be_written_is_one_line(last_line, wads, folder
     assert line.startswith(str(Path.cwd() / folder))
     assert "cannot be written (" in line
     assert "--trainer.logger.save_dir" in line
+
+
+def test_a_training_that_its_data_refuse_leaves_no_folder(last_line) -> None:
+    Path("absent").mkdir()
+    assert "absent" in last_line("fit", "--config", "outdet_wads.yaml", "--data.root", "absent")
+    assert not list(Path("runs/outdet_wads").iterdir())
