@@ -30,8 +30,6 @@ TASK = {"type": "other", "name": "rain and snow in LiDAR scans, point by point"}
 # What a score of the card is called on a hub.
 METRICS = {
     "iou": "IoU of rain",
-    "precision": "precision of rain",
-    "recall": "recall of rain",
     "taken": "share of the points removed",
 }
 
@@ -84,11 +82,7 @@ def page(card: ModelCard, repository: str) -> str:
         repository: Address of derain's repository.
     """
     rows = [
-        [
-            score.data,
-            *map(number_text, (score.precision, score.recall, score.iou)),
-            number_text(score.taken, ".3%"),
-        ]
+        [score.data, number_text(score.iou), number_text(score.taken, ".3%")]
         for score in card.scores
     ]
     parts = [
@@ -100,7 +94,7 @@ def page(card: ModelCard, repository: str) -> str:
         "## When not to use it",
         _bullets(card.not_for),
         "## How good it is",
-        markdown_table(["data", "precision", "recall", "IoU", "removed"], rows),
+        markdown_table(["data", "IoU", "removed"], rows),
         f"Measured by: {card.measured}.",
         "## How it was made",
         f"Learnt from: {card.data}; seed {card.seed}.",

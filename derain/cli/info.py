@@ -245,8 +245,5 @@ def _scores(scores: Sequence[ModelScore]) -> str:
     """A table of scores: a line of headings, and a line for each data set."""
     if not scores:
         return "    not measured"
-    rows = [["", "P", "R", "IoU", "taken"]]
-    for score in scores:
-        figures = map(number_text, (score.precision, score.recall, score.iou))
-        rows.append([score.data, *figures, number_text(score.taken, ".3%")])
-    return indent(plain_table(rows), "  ")
+    rows = [[one.data, number_text(one.iou), number_text(one.taken, ".3%")] for one in scores]
+    return indent(plain_table([["", "IoU", "taken"], *rows]), "  ")

@@ -30,17 +30,13 @@ class ModelScore:
 
     Attributes:
         data: Name of the data, with a word where their rain is simulated.
-        precision: Share of rain among the removed points; None if it was not measured, or where
-            nothing is rain.
-        recall: Share of the rain that it takes; None as before.
-        iou: Intersection over union of rain, of pooled counts; None as before.
+        iou: Intersection over union of rain, of pooled counts; None if it was not measured, or
+            where nothing is rain.
         taken: Share of the points that it takes, which are all mistaken where the data are clean;
             None where it was not measured.
     """
 
     data: str
-    precision: float | None = None
-    recall: float | None = None
     iou: float | None = None
     taken: float | None = None
 
@@ -51,8 +47,8 @@ class ModelScore:
         Raises:
             InputError: Something that is none.
         """
-        shares = dict.fromkeys(("precision", "recall", "iou", "taken"), _share)
-        return cls(**entry.record({"data": Entry.text, **shares}, required=("data",)))
+        parsers = {"data": Entry.text, "iou": _share, "taken": _share}
+        return cls(**entry.record(parsers, required=("data",)))
 
 
 @dataclass(frozen=True)
