@@ -371,7 +371,7 @@ def class_ids(label: Array) -> Ints:
 def _copied_to_float32(values: Array) -> Float32s:
     with np.errstate(over="ignore", invalid="ignore"):
         if isinstance(values, np.ma.MaskedArray):
-            values = values.astype(np.float32).filled(np.nan)
+            values = np.ma.filled(values.astype(np.float32), np.nan)
         return np.array(values, np.float32, order="C")
 
 
