@@ -3,15 +3,17 @@
 import argparse
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from functools import partial
 
 from derain.cli.options import count
 from derain.errors import InputError
 from derain.jobs.running import Submits
 from derain.jobs.shard import TASK, Shard
 from derain.jobs.workers import processes
-from derain.recordings.posed import ODOMETRY, Odometry, with_poses
+from derain.recordings.posed import ODOMETRY, with_odometry, with_poses
 from derain.sources.method import Method
 from derain.sources.source import Source
+from derain.sources.unit_judging import Placing
 from derain.sources.units import BLOCK, Division, spans_of
 from derain.system.cores import threads_of
 from derain.system.memory import total_memory
@@ -168,9 +170,11 @@ def prepared(source: Source, arguments: argparse.Namespace) -> Source:
     return source.map(lambda frame: frame.with_intensity_times(arguments.intensity_scale))
 
 
-def odometry_of(arguments: argparse.Namespace) -> Odometry | None:
+def odometry_of(arguments: argparse.Namespace) -> Placing | None:
     """The odometry for the process that does a unit; None if poses are not to be computed."""
-    return Odometry(arguments.threads) if arguments.poses == ODOMETRY else None
+    if arguments.poses != ODOMETRY:
+        return None
+    return partial(with_odometry, threads=arguments.threads)
 
 
 def method_and_workers(

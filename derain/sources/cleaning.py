@@ -106,8 +106,8 @@ def clean(
         method: A model, a filter, or a method that sees several scans.
         sink: Folder or URL to write to, or a sink with its options, opened by ``with``.
         placing: Finds where the scans of whole recordings were taken, in the process that cleans
-            them, such as :class:`derain.recordings.posed.Odometry`. None leaves the frames as they
-            are.
+            them, such as :func:`derain.recordings.posed.with_odometry`. None leaves the frames as
+            they are.
         most_removed: Scans with a greater share of rain in their valid points are not written.
         weather: Options for measuring the weather.
         observer: Follows the cleaning.

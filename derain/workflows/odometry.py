@@ -134,8 +134,9 @@ def placed(source: Source, poses: str | None, threads: int = 0) -> Source:
 
     Args:
         source: The frames.
-        poses: As :func:`derain.recordings.posed.with_poses` takes it. None leaves the frames as
-            they are: a method that needs poses takes those beside the scans, or finds them itself.
+        poses: As :func:`derain.recordings.posed.with_poses` takes it, or ``odometry``. None leaves
+            the frames as they are: a method that needs poses takes those beside the scans, or finds
+            them itself.
         threads: Threads of odometry; 0 takes every core.
 
     Raises:
@@ -149,8 +150,8 @@ def placed(source: Source, poses: str | None, threads: int = 0) -> Source:
     posed: list[Frame] = []
     registered = with_odometry(source, threads)
     bar = tqdm(registered, total=len(source), desc=ODOMETRY, unit="scan", disable=None)
-    for frame, registration in bar:
-        notices.warn(frame.name, registration.issues())
+    for frame, issues in bar:
+        notices.warn(frame.name, issues)
         posed.append(frame)
     notices.warn_of_repeats()
     return Frames(posed)

@@ -17,7 +17,7 @@ from derain.evaluation.hard_cases import scene
 from derain.export.recorded import RecordedDerainer
 from derain.jobs.shard import Shard
 from derain.jobs.workers import WorkerPool
-from derain.recordings.posed import ODOMETRY, Odometry, with_poses
+from derain.recordings.posed import with_odometry
 from derain.sources.clean_sink import Destination
 from derain.sources.cleaned_bags import BagOptions
 from derain.sources.frame import Frame
@@ -142,12 +142,12 @@ def test_odometry_in_units_is_that_of_the_whole_source(drive, tmp_path) -> None:
         poses.unlink()
     source, method = derain.named_frames(drive), derain.PersistenceDerainer(threads=1)
     out, every = tmp_path / "units", WeatherOptions(every_scan=True)
-    before = with_poses(source, ODOMETRY, threads=1)
+    before = derain.Frames(frame for frame, _ in with_odometry(source, threads=1))
     whole = clean(before, method, tmp_path / "whole", weather=every)
     assert any(one.number != other.number for one, other in zip(before, source, strict=True))
     units = Division(2, keep_records=True)
     for each in (None, units, units):
-        report = clean(source, method, out, placing=Odometry(1), weather=every, division=each)
+        report = clean(source, method, out, placing=with_odometry, weather=every, division=each)
         assert contents(tmp_path / "whole") == contents(out)
         assert [scan.weather for scan in report.scans] == [scan.weather for scan in whole.scans]
     assert report.before == SCANS  # and not those of the recording of which a scan failed
