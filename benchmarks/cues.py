@@ -53,10 +53,11 @@ def main() -> None:
         if data.taken:
             continue
         found = finder.measured(data)
-        scores = score(methods, map(found.reader.read, found.frames), found.card, found.distinct)
+        reader = found.reader
+        scores = score(methods, map(reader.read, found.frames), reader.card, reader.distinct)
         rows.append([title, *(f"{each.pooled.iou:.3f}" for each in scores)])
         if title == TIMED:
-            times = _milliseconds(derainers, found.reader.read(found.frames[0]), arguments.rounds)
+            times = _milliseconds(derainers, reader.read(found.frames[0]), arguments.rounds)
             rows.append([f"{title}, ms", *times, "-"])
     print(markdown_table(["data", *TITLES, WITHHELD], rows))
 

@@ -71,8 +71,9 @@ def _measured(method: Method, found: LabelledFrames) -> str:
     rain = [judgement.rain for _, judgement, _ in answers]
     milliseconds = 1e3 * (time.perf_counter() - begin) / len(rain)
     in_turn = iter(rain)
-    scans = map(found.reader.read, found.frames)
-    (scores,) = score([lambda _: next(in_turn)], scans, found.card, found.distinct)
+    reader = found.reader
+    scans = map(reader.read, found.frames)
+    (scores,) = score([lambda _: next(in_turn)], scans, reader.card, reader.distinct)
     return f"{scores.pooled.iou:.3f}, {milliseconds:.0f} ms"
 
 

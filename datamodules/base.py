@@ -13,7 +13,6 @@ from derain.datamodules.scan_data import Loading, Part, ScanData, with_needed_la
 from derain.errors import InputError
 from derain.learning.batch import Sample
 from derain.scan import Scan
-from derain.sources.reader import FrameReader
 from derain.sources.source import Source
 from derain.sources.spread import evenly_spaced
 from derain.sources.training_record import record_of_scans
@@ -90,7 +89,7 @@ class ScanDataModule(ScanData, lightning.LightningDataModule):
             InputError: A scan or labels that cannot be read.
         """
         frames = with_needed_labels(self.source("train"), "train", labelled)
-        reader = FrameReader(self.card, self.loading.intensity_scale, columns)
+        reader = self.loading.reader(self.card, columns)
         return map(reader.read, evenly_spaced(frames, most))
 
     def training_record(self) -> dict[str, tuple[str, ...]]:

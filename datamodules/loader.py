@@ -13,7 +13,6 @@ from derain.errors import InputError
 from derain.learning.batch import VIEW, Batch, Sample, summed_times
 from derain.learning.seeds import run_seed
 from derain.learning.task import Task
-from derain.sources.reader import FrameReader
 from derain.sources.source import Source
 from derain.system.stopwatch import Stopwatch
 
@@ -65,8 +64,7 @@ def scan_loader(
             "would turn a scan but not the scans around it, which the network also sees",
             "Set rotation_probability and mirror_probability to 0.",
         )
-    reader = FrameReader(task.card, loading.intensity_scale, task.columns)
-    once = loading.counts_once(task.card)
+    reader = loading.reader(task.card, task.columns)
     augmented = part == "train" and loading.augmentation.changes_anything
     # Tests and predictions read each scan once.
     room = loading.cache_mb * MEGABYTE if part in ("train", "validation") else 0
@@ -77,7 +75,7 @@ def scan_loader(
             # Jitter would separate points at one position, which the view merges in deployment.
             "train": reader.read_distinct,
             "predict": reader.read_unlabelled,
-        }.get(part, reader.read_distinct if once else reader.read),
+        }.get(part, reader.read_measured),
         view,
         reader,
         loading.augmentation if augmented else None,

@@ -58,9 +58,15 @@ class Loading:
             if value < fewest:
                 raise InputError(name, f"{value} is too few", f"Give {fewest} or more.")
 
-    def counts_once(self, card: DataCard) -> bool:
-        """True if points at one position are measured once."""
-        return card.deduplicate if self.deduplicate is None else self.deduplicate
+    def reader(self, card: DataCard, columns: Sequence[str] | None) -> FrameReader:
+        """Reads scans by these options.
+
+        Args:
+            card: Their data card.
+            columns: Columns to keep, as of :class:`~derain.sources.reader.FrameReader`.
+        """
+        distinct = card.deduplicate if self.deduplicate is None else self.deduplicate
+        return FrameReader(card, self.intensity_scale, columns, distinct)
 
 
 class ScanData(ABC):
@@ -80,11 +86,6 @@ class ScanData(ABC):
     def __init__(self, card: DataCard, loading: Loading) -> None:
         self.card = card
         self.loading = loading
-
-    @property
-    def distinct(self) -> bool:
-        """True if points at one position are measured once."""
-        return self.loading.counts_once(self.card)
 
     @abstractmethod
     def source(self, part: Part) -> Source:
@@ -109,7 +110,7 @@ class ScanData(ABC):
         Raises:
             InputError: A file that cannot be read, or labels that are not in the data card.
         """
-        return self._reader.read(frame)
+        return self.reader.read(frame)
 
     def read_measured(self, frame: Frame) -> Scan:
         """Reads the points of a scan that are measured, with their labels.
@@ -117,12 +118,13 @@ class ScanData(ABC):
         Raises:
             InputError: A file that cannot be read, or labels that are not in the data card.
         """
-        return (self._reader.read_distinct if self.distinct else self._reader.read)(frame)
+        return self.reader.read_measured(frame)
 
     @property
-    def _reader(self) -> FrameReader:
+    def reader(self) -> FrameReader:
+        """Reads them with their labels."""
         columns = None if self.task is None else self.task.columns
-        return FrameReader(self.card, self.loading.intensity_scale, columns)
+        return self.loading.reader(self.card, columns)
 
 
 def with_needed_labels(source: Source, part: Part, reads_labels: bool) -> Source:

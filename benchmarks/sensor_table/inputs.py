@@ -148,7 +148,7 @@ class DataFinder:
             paths = [require(self.shared / scans) for scans in data.scans]
         found = labelled_scans(paths, card_of(paths, data.card), Loading())
         frames = [frame for part in parts for frame in found.frames(part)]
-        return LabelledFrames(found.card, frames, distinct=found.distinct)
+        return LabelledFrames(found.reader, frames)
 
     def _made(self, options: str) -> Path:
         """The folder of a simulated data set, which is taken as it is where it is complete."""

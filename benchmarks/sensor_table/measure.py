@@ -91,12 +91,13 @@ class Measurement:
         self, title: str, data: LabelledData, found: LabelledFrames, rows: Sequence[BenchEntry]
     ) -> Iterator[Column]:
         scans = map(found.reader.read, tqdm(found.frames, desc=title, unit="scan", disable=None))
-        of_rows = score(scored_methods(rows, self.threads), scans, found.card, found.distinct)
+        card = found.reader.card
+        of_rows = score(scored_methods(rows, self.threads), scans, card, found.reader.distinct)
         scores = {row.title: each for row, each in zip(rows, of_rows, strict=True)}
         for method, each in scores.items():
             for scan, reason in each.failures.items():
                 self.left_out.reasons[f"{method}: {scan}"] = reason
-        about = {**asdict(data), "card": found.card.name, "measured_scans": len(found.frames)}
+        about = {**asdict(data), "card": card.name, "measured_scans": len(found.frames)}
         if data.taken:
             yield from (_taken(title, kind, scores, about) for kind in data.taken)
             return
@@ -111,7 +112,7 @@ class Measurement:
         """True if a method was trained on scans of a column, by its record or by the plan."""
         spec = row.spec_or_filter
         recorded = isinstance(spec, Spec) and training_overlap(
-            row.title, spec, found.card, found.frames
+            row.title, spec, found.reader.card, found.frames
         )
         return bool(recorded) or column in self.plan.methods[row.title].learnt_from
 

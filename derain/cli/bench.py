@@ -107,8 +107,7 @@ def main(arguments: argparse.Namespace) -> int:
     rates = rain_rates(arguments.data, arguments.rain_rates)
 
     def labelled_frames(scans: LabelledScans, frames: Sequence[Frame]) -> LabelledFrames:
-        scale = scans.loading.intensity_scale
-        return LabelledFrames(scans.card, frames, scale, scans.distinct, rates)
+        return LabelledFrames(scans.reader, frames, rates)
 
     # Read at their first use: a bench without such a baseline needs no training scans.
     methods = bench_entries(

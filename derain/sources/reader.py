@@ -23,11 +23,13 @@ class FrameReader:
         intensity_scale: Factor from the scans' intensities to the unit of the card.
         columns: Columns to keep besides those of every scan: to a model, the others
             would only cost memory. None keeps all.
+        distinct: True if points at one position are measured once.
     """
 
     card: DataCard
     intensity_scale: float = 1.0
     columns: Sequence[str] | None = None
+    distinct: bool = False
 
     def read(self, frame: Frame) -> Scan:
         """Reads all rows of a scan, with its labels if they are to be read.
@@ -56,6 +58,14 @@ class FrameReader:
         """
         scan = self.read(frame)
         return scan.take(first_rows(scan))
+
+    def read_measured(self, frame: Frame) -> Scan:
+        """Reads the points of a scan that are measured, with their labels.
+
+        Raises:
+            InputError: A scan that cannot be read, or labels that are not in the data card.
+        """
+        return self.read_distinct(frame) if self.distinct else self.read(frame)
 
     def with_labels(self, scan: Scan, frame: Frame) -> Scan:
         """The scan with the labels of its frame; the data card defines all of them."""

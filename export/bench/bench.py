@@ -161,10 +161,10 @@ def bench(
     """
     card = card if isinstance(card, DataCard) else load_card(card)
     deduplicate = card.deduplicate if distinct is None else distinct
+    reader = FrameReader(card, intensity_scale, distinct=deduplicate)
 
     def labelled(given: GivenScans) -> LabelledFrames:
-        frames = source_of(given, columns)
-        return LabelledFrames(card, frames, intensity_scale, deduplicate, rain_rates or {})
+        return LabelledFrames(reader, source_of(given, columns), rain_rates or {})
 
     learn_from = None if train is None else labelled(train).truths
     rows = bench_entries(methods, learn_from, Runtime(runtime, precision))
@@ -197,7 +197,7 @@ def count_in_units(
     Raises:
         InputError: A scan that cannot be read; records of other options in the folder.
     """
-    work = Counting(methods, threads, data.reader, data.distinct, data.rain_rates)
+    work = Counting(methods, threads, data.reader, data.rain_rates)
     if folder is None or not division.keeps_records(data.frames, folder):
         # In this process they are of one scan, so that a progress bar counts scans.
         units = units_of(data.frames, None, 1 if executor is None else division.block)
@@ -235,15 +235,15 @@ def run_bench(
     for note in notes:
         warn(note)
     timed_on: Sequence[Frame] = evenly_spaced(data.frames, effort.timed)
-    timed_on = [frame.with_intensity_times(data.intensity_scale) for frame in timed_on]
-    scores = [Scores(data.card) for _ in methods]
+    timed_on = [frame.with_intensity_times(data.reader.intensity_scale) for frame in timed_on]
+    scores = [Scores(data.reader.card) for _ in methods]
     for of_unit in counted:
         for of_method, counts in zip(scores, of_unit["counts"], strict=True):
             of_method.add_json(counts)
         for scan, method, kind, detail in of_unit["issues"]:
             notices.warn(scan, [ScanIssue(kind, detail)], method)
     rained = any(one.pooled.true_positive + one.pooled.false_negative for one in scores)
-    warn_without_rain(rained, data.card)
+    warn_without_rain(rained, data.reader.card)
     costs = [
         measure_cost(method, timed_on, effort)
         for method in tqdm(methods, desc="timing", unit="method", disable=None)
@@ -283,7 +283,7 @@ def _overlap(method: BenchEntry, data: LabelledFrames) -> str | None:
     spec = method.spec_or_filter
     if not isinstance(spec, Spec):
         return None
-    return training_overlap(method.title, spec, data.card, data.frames)
+    return training_overlap(method.title, spec, data.reader.card, data.frames)
 
 
 def _untimed(method: TimedMethod, scan: Scan) -> Bools:
@@ -298,14 +298,12 @@ class Counting(ValueWork[FrameUnit]):
         methods: The methods.
         threads: Threads of views and networks.
         reader: Reads the scans.
-        distinct: True if points at one position count once.
         rain_rates: Rain rate in mm/h by sequence, where it is known.
     """
 
     methods: Sequence[BenchEntry]
     threads: int
     reader: FrameReader
-    distinct: bool
     rain_rates: Mapping[str, float]
 
     def value(self, unit: FrameUnit) -> dict[str, Any]:
@@ -323,7 +321,7 @@ class Counting(ValueWork[FrameUnit]):
                 yield scan
 
         rates = [self.rain_rates.get(frame.sequence) for frame in unit.frames]
-        scored = score(self._ready, scans(), self.reader.card, self.distinct, rates)
+        scored = score(self._ready, scans(), self.reader.card, self.reader.distinct, rates)
         files = []
         for frame in unit.frames:
             of_scan, of_label = frame.checksums()
@@ -349,10 +347,10 @@ def _options(methods: Sequence[BenchEntry], data: LabelledFrames, block: int) ->
     return {
         **shared_options("bench", data.frames, block),
         **{f"method {method.title}": method.fingerprint for method in methods},
-        "card": data.card.name,
-        "content of the card": _fingerprint(data.card),
-        "intensity_scale": data.intensity_scale,
-        "distinct": data.distinct,
+        "card": data.reader.card.name,
+        "content of the card": _fingerprint(data.reader.card),
+        "intensity_scale": data.reader.intensity_scale,
+        "distinct": data.reader.distinct,
         "rain rates": _fingerprint(sorted(data.rain_rates.items())),
     }
 
@@ -395,7 +393,7 @@ def _facts(
     files: Sequence[Mapping[str, Any]],
 ) -> dict[str, Any]:
     """Everything that a bench depends on besides its methods, as JSON-able primitives."""
-    card, frames = data.card, data.frames
+    card, frames = data.reader.card, data.frames
     others = [method.runtime.name for method in methods if method.usual]
     scans = "1 scan" if len(frames) == 1 else f"{len(frames):,} scans"
     return {

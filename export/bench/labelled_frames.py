@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.scan import Bools, Scan
 from derain.sources.frame import Frame
@@ -19,20 +18,16 @@ class LabelledFrames:
     """Labelled scans, and how they are read and counted.
 
     Attributes:
-        card: Their data card.
+        reader: Reads them with their labels, in the unit of the methods.
         frames: The scans, one or more.
-        intensity_scale: Factor from their intensities to the unit of the methods.
-        distinct: Count points at one position once.
         rain_rates: Rain rate in mm/h by sequence, where it is known.
 
     Raises:
         InputError: No scans, or one without labels.
     """
 
-    card: DataCard
+    reader: FrameReader
     frames: Sequence[Frame]
-    intensity_scale: float = 1.0
-    distinct: bool = False
     rain_rates: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -47,11 +42,5 @@ class LabelledFrames:
         Raises:
             InputError: A file that cannot be read, or labels that are not on the data card.
         """
-        read = self.reader.read_distinct if self.distinct else self.reader.read
         for frame in evenly_spaced(self.frames, MOST_TRAINING_SCANS):
-            yield self.card.known_points(read(frame))
-
-    @property
-    def reader(self) -> FrameReader:
-        """Reads them with their labels."""
-        return FrameReader(self.card, self.intensity_scale)
+            yield self.reader.card.known_points(self.reader.read_measured(frame))

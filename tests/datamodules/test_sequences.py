@@ -36,9 +36,9 @@ def test_data_sets_are_split_and_counted_as_published() -> None:
         "validation": ("11", "16"),
         "test": ("12", "13", "17", "22", "23", "26", "30", "35", "76"),
     }
-    assert Wads(root="somewhere", loading=Loading(batch_size=4)).distinct
-    assert not Wads(root="somewhere", loading=Loading(deduplicate=False)).distinct
-    assert not Rehearse3D(root="somewhere").distinct
+    assert Wads(root="somewhere", loading=Loading(batch_size=4)).reader.distinct
+    assert not Wads(root="somewhere", loading=Loading(deduplicate=False)).reader.distinct
+    assert not Rehearse3D(root="somewhere").reader.distinct
 
 
 def test_scans_come_in_the_order_of_the_split_with_their_labels(root) -> None:

@@ -10,6 +10,7 @@ from derain.export.bench.cost import measure_in_process
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.files.labels import write_labels
 from derain.sources.folders import named_frames
+from derain.sources.reader import FrameReader
 
 CARD = DataCard("made up", {0: "solid", 3: "rain", 9: "unknown"}, rain=(3,), unknown=(9,))
 
@@ -27,7 +28,7 @@ def labelled(tmp_path) -> LabelledFrames:
         write_labels(path.with_suffix(".label"), label)
     folders = sorted(tmp_path.glob("sequence */scans"))
     rates = {"sequence 0": 10.0, "sequence 1": 25.0, "sequence 2": 10.0}
-    return LabelledFrames(CARD, named_frames(folders, labelled=True), rain_rates=rates)
+    return LabelledFrames(FrameReader(CARD), named_frames(folders, labelled=True), rain_rates=rates)
 
 
 @pytest.fixture

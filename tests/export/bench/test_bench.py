@@ -64,7 +64,7 @@ def test_methods_are_names_files_derainers_filters_and_functions(labelled, tmp_p
         "file": parameters(tmp_path / "low.yaml", method=str(KEPT), threshold=0.4),
         "function": all_points,
     }
-    found = bench(methods, labelled.frames, labelled.card, **QUICK)
+    found = bench(methods, labelled.frames, labelled.reader.card, **QUICK)
     assert [row.title for row in found.rows] == list(methods)
     pooled = {row.title: row.scores.pooled for row in found.rows}
     assert pooled["name"] == pooled["filter"] == pooled["filter, ready"]
@@ -79,7 +79,7 @@ def test_methods_are_names_files_derainers_filters_and_functions(labelled, tmp_p
         known = scan.label != 9
         expected += Counts.of(derainer(scan)[known], (scan.label == 3)[known])
     assert pooled["model"] == pooled["file"] == expected != pooled["path"]
-    untitled = bench([DSOR(), derainer, all_points], scans, labelled.card, **QUICK)
+    untitled = bench([DSOR(), derainer, all_points], scans, labelled.reader.card, **QUICK)
     assert [row.title for row in untitled.rows] == ["dsor", "outdet", "all_points"]
 
 
@@ -89,8 +89,8 @@ def test_scans_in_memory_score_as_the_same_scans_in_files(labelled) -> None:
     files = [frame.path for frame in labelled.frames]
     scans = [labelled.reader.read(frame) for frame in labelled.frames]
     rates = labelled.rain_rates
-    of_files = bench(methods, files, labelled.card, train=files, rain_rates=rates, **QUICK)
-    of_scans = bench(methods, scans, labelled.card, train=scans, **QUICK)
+    of_files = bench(methods, files, labelled.reader.card, train=files, rain_rates=rates, **QUICK)
+    of_scans = bench(methods, scans, labelled.reader.card, train=scans, **QUICK)
     for in_files, in_memory in zip(of_files.rows, of_scans.rows, strict=True):
         assert list(in_files.scores.by_rain_rate) == ["10 mm/h", "25 mm/h"]
         counts = {**in_files.scores.to_json(), "by_rain_rate": []}
@@ -138,7 +138,7 @@ def test_a_script_that_guards_nothing_is_run_once_and_times_its_own_functions(tm
 def test_a_function_that_gives_no_mask_fails_in_every_scan(labelled, answer) -> None:
     (entry,) = bench_entries({"odd": lambda scan: answer(len(scan))})
     scans = map(labelled.reader.read, labelled.frames)
-    (scores,) = score(scored_methods([entry], 1), scans, labelled.card)
+    (scores,) = score(scored_methods([entry], 1), scans, labelled.reader.card)
     assert len(scores.failures) == 3
     assert all("Let it return a bool array" in why for why in scores.failures.values())
 
@@ -160,16 +160,16 @@ def test_a_method_that_cannot_be_used_is_refused(methods, reason) -> None:
 
 def test_scans_that_cannot_be_benched_are_refused(labelled) -> None:
     with pytest.raises(InputError, match="scans: there are none"):
-        bench(["all"], [], labelled.card)
+        bench(["all"], [], labelled.reader.card)
     labelled.frames[0].label_path.unlink()
     with pytest.raises(InputError, match="its labels are not at"):
-        bench(["all"], labelled.frames, labelled.card)
+        bench(["all"], labelled.frames, labelled.reader.card)
 
 
 @pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize(("rain", "warned"), [((3,), False), ((9,), True)])
 def test_a_bench_without_rain_warns(labelled, capsys, rain, warned) -> None:
-    frames, card = labelled.frames[1:], replace(labelled.card, rain=rain, unknown=())
+    frames, card = labelled.frames[1:], replace(labelled.reader.card, rain=rain, unknown=())
     bench(["none"], frames, card, **QUICK)
     assert ("no point of these scans is unknown" in capsys.readouterr().err) == warned
 
@@ -185,11 +185,11 @@ def test_filters_share_one_search_and_score_as_they_would_alone(labelled, monkey
     rows = bench_entries(list(FILTERS))
     monkeypatch.setattr(NeighbourView, "__call__", counted)
     scans = list(map(labelled.reader.read, labelled.frames))
-    together = score(scored_methods(rows, threads=1), scans, labelled.card)
+    together = score(scored_methods(rows, threads=1), scans, labelled.reader.card)
     assert searches == [9, 9, 9]  # SSR looks at the most
     monkeypatch.undo()
     alone = [FilterDerainer(row.filter, threads=1) for row in rows]
-    apart = score(alone, scans, labelled.card)
+    apart = score(alone, scans, labelled.reader.card)
     assert [each.to_json() for each in together] == [each.to_json() for each in apart]
 
 
@@ -214,7 +214,7 @@ def test_what_another_runtime_changes_is_counted_and_its_failure_is_stated(
     model = load_method(str(KEPT), {}, 1, Runtime("rainy", "int2"))
     methods = {"mine": model, "all": "all"}
     options = {**QUICK, "timed": 2}
-    found = bench(methods, labelled.frames, labelled.card, **options)
+    found = bench(methods, labelled.frames, labelled.reader.card, **options)
     # All is rain to it, so that it flips what onnxruntime does not call rain.
     assert found["mine"].scores.pooled == found["all"].scores.pooled
     (change,) = found.facts["runtimes"]
@@ -233,7 +233,7 @@ def test_what_another_runtime_changes_is_counted_and_its_failure_is_stated(
         raise MemoryError("no room")
 
     monkeypatch.setattr("derain.export.proof.compare_runtimes", failing)
-    found = bench(methods, labelled.frames, labelled.card, **options)
+    found = bench(methods, labelled.frames, labelled.reader.card, **options)
     failure = {"method": "mine", "runtime": "rainy int2", "failure": "no room"}
     assert found.facts["runtimes"] == [failure]
     assert "no room" in str(found)

@@ -39,7 +39,7 @@ def cost(milliseconds: float) -> Cost:
 def scored(methods: list[BenchEntry], data: LabelledFrames) -> list[Scores]:
     rates = [data.rain_rates.get(frame.sequence) for frame in data.frames]
     scans = map(data.reader.read, data.frames)
-    return score(scored_methods(methods, 1), scans, data.card, rain_rates=rates)
+    return score(scored_methods(methods, 1), scans, data.reader.card, rain_rates=rates)
 
 
 @pytest.fixture
