@@ -8,8 +8,10 @@ it grows little when others use the machine.
 """
 
 import argparse
+import multiprocessing
 import tempfile
 import time
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +26,6 @@ from derain.simulation.sensor import packaged_sensors
 from derain.sources.folders import frame_of
 from derain.sources.frame import Frame
 from derain.system.stopwatch import Stopwatch
-from derain.system.workers import worker_pool
 
 # Rows and columns of a sensor of which some more points return than are taken.
 SENSORS = {
@@ -90,7 +91,7 @@ def measured(entry: BenchEntry, frame: Frame, repeats: int) -> tuple[float, floa
 
 
 def _cell(entry: BenchEntry, frame: Frame, repeats: int) -> str:
-    with worker_pool(1) as pool:
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
         milliseconds, memory = pool.submit(measured, entry, frame, repeats).result()
     return f"{milliseconds:,.0f} ms, {memory:,.0f} MiB"
 

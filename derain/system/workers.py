@@ -6,35 +6,12 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from types import ModuleType
 
 # Environment variable with the id of the process that began a run on several devices, which the
 # further processes that Lightning starts for the run watch.
 LAUNCHER = "DERAIN_LAUNCHER"
-
-
-@contextmanager
-def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Starts a pool of processes.
-
-    An error or a signal in the block kills them. When this process is killed they end as well,
-    instead of waiting for work for ever.
-
-    Args:
-        workers: Number of workers.
-    """
-    others = set(multiprocessing.active_children())
-    # Not forked: a fork has the locks of this process, but not the threads that would release them.
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, context, end_with_parent) as pool:
-        try:
-            yield pool
-        except BaseException:
-            for worker in set(multiprocessing.active_children()) - others:
-                worker.kill()
-            raise
 
 
 @contextmanager

@@ -12,9 +12,8 @@ from pathlib import Path
 from derain.errors import reason_of
 from derain.export.bench.bench_entries import BenchEntry
 from derain.export.timing import RunTimes, timed_runs
+from derain.jobs.workers import WorkerPool
 from derain.sources.frame import Frame
-from derain.system.memory import keep_freed_memory
-from derain.system.workers import without_main_module, worker_pool
 
 
 @dataclass(frozen=True)
@@ -64,10 +63,8 @@ def measure_cost(bench_entry: BenchEntry, frames: Sequence[Frame], effort: Effor
         if not bench_entry.is_picklable:
             here = measure_in_process(bench_entry, frames, effort)
             return replace(here, peak_memory=None, alone=False)
-        with worker_pool(1) as pool:
-            with without_main_module():
-                measured = pool.submit(_measure_alone, bench_entry, frames, effort)
-            return measured.result()
+        with WorkerPool(1) as pool:
+            return pool.submit(measure_in_process, bench_entry, frames, effort).result()
     except Exception as error:  # its row states whatever a library raises
         return Cost(RunTimes.of_no_runs(), None, reason_of(error), bench_entry.is_picklable)
 
@@ -76,11 +73,6 @@ def measure_in_process(bench_entry: BenchEntry, frames: Sequence[Frame], effort:
     """Runs a method on every scan, in turns, in this process; see :func:`measure_cost`."""
     times = timed_runs(bench_entry.ready(effort.threads), frames, effort.repeats)
     return Cost(times, _peak_memory())
-
-
-def _measure_alone(bench_entry: BenchEntry, frames: Sequence[Frame], effort: Effort) -> Cost:
-    keep_freed_memory()
-    return measure_in_process(bench_entry, frames, effort)
 
 
 def _peak_memory() -> float | None:

@@ -4,20 +4,17 @@ import os
 import subprocess
 import sys
 import threading
-import time
-from concurrent.futures import Future
-from concurrent.futures.process import BrokenProcessPool
 
 import pytest
 
-from derain.system.workers import LAUNCHER, exit_with_launcher, worker_pool
+from derain.system.workers import LAUNCHER, exit_with_launcher
 
 HAS_A_WORKER = """
 import time
-from derain.system.workers import worker_pool
+from derain.jobs.workers import WorkerPool
 
 if __name__ == "__main__":
-    with worker_pool(1) as pool:
+    with WorkerPool(1) as pool:
         pool.submit(print, "at work", flush=True).result()
         pool.submit(time.sleep, 600).result()
 """
@@ -65,20 +62,6 @@ def test_no_process_outlives_the_one_that_it_works_for(tmp_path, program) -> Non
         assert process.stdout.readline() == b"at work\n"
         process.kill()
         process.communicate(timeout=30)  # returns when nobody holds the other end of the pipe
-
-
-def test_an_error_does_not_wait_for_what_workers_are_at() -> None:
-    work: list[Future[None]] = []
-
-    def fail() -> None:
-        with worker_pool(1) as pool:
-            pool.submit(int).result()  # the worker is there
-            work.append(pool.submit(time.sleep, 600))
-            raise ZeroDivisionError
-
-    with pytest.raises(ZeroDivisionError):
-        fail()
-    assert isinstance(work[0].exception(), BrokenProcessPool)
 
 
 @pytest.mark.parametrize("environment", [{}, {"LOCAL_RANK": "1"}], ids=["alone", "by hand"])
