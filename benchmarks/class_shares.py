@@ -11,7 +11,8 @@ import numpy as np
 
 from derain.cards.card import load_card
 from derain.datamodules.simulated import Simulated
-from derain.evaluation.contents import Contents, count_frame, find_sequences
+from derain.evaluation.contents import Contents, FrameCounting, find_sequences
+from derain.sources.units import whole
 
 # Source: data_cfg.yaml of the SalsaNext model published with REHEARSE-3D.
 PUBLISHED = {
@@ -42,10 +43,9 @@ def main() -> None:
 def _print_shares(root: Path) -> None:
     sequences = find_sequences(root, load_card("simulated").layout)
     total = Contents()
-    for sequence in sequences:
-        for frame in sequence.frames:
-            total.add(count_frame(frame))
-    clean = sum(not sequence.rain_rate for sequence in sequences) / len(sequences)
+    for frames, _ in sequences:
+        total.add(Contents.from_json(FrameCounting().value(whole(frames))))
+    clean = sum(not rate for _, rate in sequences) / len(sequences)
     print("| | simulated | REHEARSE-3D |\n|---|---|---|")
     print(f"| points per scan | {total.points / total.scans:,.0f} | {PUBLISHED_POINTS:,} |")
     print(f"| clean sequences | {clean:.0%} | 39% |")

@@ -103,7 +103,8 @@ def main() -> None:
 
 
 def _examples(data: Simulated, root: Path) -> Iterator[Example]:
-    rates = {each.name: each.rain_rate or 0.0 for each in find_sequences(root, CARD.layout)}
+    sequences = find_sequences(root, CARD.layout)
+    rates = {frames[0].sequence: rate or 0.0 for frames, rate in sequences}
     for frame in data.frames("test"):
         scan = data.read(frame)
         alone = Path(frame.name.replace(CARD.layout.scans, CARD.layout.lidar))

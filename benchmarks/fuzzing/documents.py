@@ -250,5 +250,5 @@ def _read_weather(path: Path) -> None:
         (sequence / folder).mkdir(parents=True, exist_ok=True)
     (sequence / "velodyne" / "0.bin").write_bytes(b"")
     (sequence / "weather" / "0.csv").write_bytes(path.read_bytes())
-    (found,) = find_sequences(path.parent, Layout())
-    assert found.rain_rate is None or math.isfinite(found.rain_rate)
+    ((_, rate),) = find_sequences(path.parent, Layout())
+    assert rate is None or math.isfinite(rate)

@@ -133,7 +133,7 @@ def facts_of_folder(
     folders = None if layout is None else [layout.scans, layout.labels]
     card, rests_on = (card, "--card") if card else _card(folder, layout)
     sequences = find_sequences(folder, layout, arguments.columns, layouts)
-    rates = {sequence.rain_rate for sequence in sequences}
+    rates = {rate for _, rate in sequences}
     ascending = sorted(rates, key=lambda rate: (rate is None, rate or 0))
     by_rain_rate = {rate: Contents() for rate in ascending}
     # In this process units are of one scan, so that a progress bar counts scans.
@@ -141,12 +141,12 @@ def facts_of_folder(
     frames: list[Frame] = []
     units: list[FrameUnit] = []
     rate_of_unit: list[float | None] = []
-    for sequence in sequences:
-        by_rain_rate[sequence.rain_rate].sequences += 1
-        of_sequence = units_of(sequence.frames, None, block)
-        frames += sequence.frames
+    for frames_of_sequence, rate in sequences:
+        by_rain_rate[rate].sequences += 1
+        of_sequence = units_of(frames_of_sequence, None, block)
+        frames += frames_of_sequence
         units += of_sequence
-        rate_of_unit += [sequence.rain_rate] * len(of_sequence)
+        rate_of_unit += [rate] * len(of_sequence)
     job, shard = None, units
     if records is not None:
         options = shared_options("info", frames, block)

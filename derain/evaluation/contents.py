@@ -19,26 +19,10 @@ from derain.files.reading import reading
 from derain.jobs.running import ValueWork
 from derain.simulation.manifest import RAIN_RATE, manifest_of
 from derain.sources.folders import frames_of, named_frames
-from derain.sources.frame import Frame
 from derain.sources.recordings import recordings_of
 from derain.sources.search import listed_scans, scan_folders
 from derain.sources.source import Frames, Source
 from derain.sources.units import FrameUnit
-
-
-@dataclass(frozen=True)
-class SequenceOfFrames:
-    """One sequence of a data set.
-
-    Attributes:
-        name: Its name.
-        frames: Its scans, in order, and where their labels are or should be.
-        rain_rate: Rain rate in mm/h; None where it is not known.
-    """
-
-    name: str
-    frames: Source
-    rain_rate: float | None
 
 
 @dataclass
@@ -103,7 +87,7 @@ def find_sequences(
     layout: Layout | None,
     columns: Sequence[str] = DEFAULT_COLUMNS,
     layouts: Sequence[Layout] | None = None,
-) -> list[SequenceOfFrames]:
+) -> list[tuple[Source, float | None]]:
     """The sequences of a data set, by name.
 
     Args:
@@ -114,12 +98,16 @@ def find_sequences(
         layouts: Names of the folders of recordings that may be sequences of data sets; by default
             those in the packaged data cards.
 
+    Returns:
+        The scans of each, in order, and where their labels are or should be; and its rain rate in
+        mm/h, None where it is not known.
+
     Raises:
         InputError: A folder without sequences or scans, or a damaged weather record.
     """
     if layout is None:
         recordings = recordings_of(named_frames(root, columns, labelled=True, layouts=layouts))
-        return [SequenceOfFrames(each[0].sequence, Frames(each), None) for each in recordings]
+        return [(Frames(each), None) for each in recordings]
     folders = scan_folders(root, layout)
     if not folders:
         raise InputError(
@@ -128,14 +116,14 @@ def find_sequences(
             "Name its folders with --layout.",
         )
     rates = manifest_of(root).get(RAIN_RATE, {})
-    sequences = []
+    sequences: list[tuple[Source, float | None]] = []
     for folder in folders:
         name = folder.absolute().parent.name
         scans = listed_scans([folder])
         keys = [f"{name}/{scan_stem(scan)}" for scan in scans]
         frames = frames_of(scans, layout.label_of, columns, keys)
         rate = rates[name] if name in rates else _recorded_rate(folder_above(folder) / "weather")
-        sequences.append(SequenceOfFrames(name, frames, rate))
+        sequences.append((frames, rate))
     return sequences
 
 
@@ -143,30 +131,19 @@ class FrameCounting(ValueWork[FrameUnit]):
     """Counts the scans and points of units."""
 
     def value(self, unit: FrameUnit) -> dict[str, Any]:
-        """The counts of a unit, as :meth:`Contents.from_json` takes them.
+        """The counts of a unit, by class where there are labels, for :meth:`Contents.from_json`.
 
         Raises:
-            InputError: As for :func:`count_frame`.
+            InputError: A scan that cannot be read, or labels that do not belong to it.
         """
-        total = Contents()
+        points, labelled = 0, Counter[str]()
         for frame in unit.frames:
-            total.add(count_frame(frame))
-        labelled = {str(id_): points for id_, points in total.labelled.items()}
-        return {"scans": total.scans, "points": total.points, "labelled": labelled}
-
-
-def count_frame(frame: Frame) -> Contents:
-    """Counts the points of a scan, by class where it has labels.
-
-    Raises:
-        InputError: A scan that cannot be read, or labels that do not belong to it.
-    """
-    points = frame.count_points()
-    contents = Contents(scans=1, points=points)
-    if frame.has_labels:
-        counts = np.bincount(frame.read_label(points))
-        contents.labelled.update({int(id_): int(counts[id_]) for id_ in np.flatnonzero(counts)})
-    return contents
+            of_frame = frame.count_points()
+            points += of_frame
+            if frame.has_labels:
+                counts = np.bincount(frame.read_label(of_frame))
+                labelled.update({str(id_): int(counts[id_]) for id_ in np.flatnonzero(counts)})
+        return {"scans": len(unit.frames), "points": points, "labelled": dict(labelled)}
 
 
 def _recorded_rate(weather: Path) -> float | None:

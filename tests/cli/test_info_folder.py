@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from derain.cards.card import load_card
-from derain.evaluation.contents import count_frame
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
 from derain.simulation.manifest import MAKER
+from derain.sources.file_frame import FileFrame
 
 
 @pytest.fixture
@@ -80,9 +80,9 @@ def test_units_are_counted_as_one_process_counts_and_not_again(
     write_labels(label, np.full(100, 7))  # other inputs, the same counts
     with monkeypatch.context() as counted:
         seen: list[str] = []
+        count = FileFrame.count_points
         counted.setattr(
-            "derain.evaluation.contents.count_frame",
-            lambda frame: seen.append(frame.key) or count_frame(frame),
+            FileFrame, "count_points", lambda frame: seen.append(frame.key) or count(frame)
         )
         assert succeed("info", data_set, "--out", tmp_path / "counts").out == table
     assert seen == ["001/000000", "001/000001"]

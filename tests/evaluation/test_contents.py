@@ -1,6 +1,7 @@
 """What a data set holds, counted by class and by rain rate."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from matplotlib.colors import to_rgba
 
 from derain.cards.layout import Layout
 from derain.errors import InputError
-from derain.evaluation.contents import Contents, count_frame, find_sequences, rate_name
+from derain.evaluation.contents import Contents, FrameCounting, find_sequences, rate_name
 from derain.evaluation.hard_cases import scene
 from derain.files import write_scan
 from derain.files.labels import write_labels
@@ -17,7 +18,9 @@ from derain.pictures.data_statistics import CLEAN, statistics_figure
 from derain.scan import Scan
 from derain.simulation.campaign import MAKER
 from derain.sources.folders import frame_of
+from derain.sources.frame import Frame
 from derain.sources.search import find_layout
+from derain.sources.units import whole
 
 REHEARSE3D = Layout(scans="lidar_radar_pcd", labels="lidar_radar_labels", lidar="innoviz")
 OTHERS = Layout(scans="lidar", labels="classes")
@@ -43,19 +46,20 @@ def test_sequences_are_found_from_the_root_to_the_sequence(tmp_path, layout, roo
     assert find_layout(folder) == layout
     sequences = find_sequences(folder, layout)
     expected = ["000"] if "000" in root else ["000", "001"]
-    assert [sequence.name for sequence in sequences] == expected
-    assert [frame.key for frame in sequences[0].frames] == ["000/000000", "000/000001"]
-    assert sequences[0].rain_rate is None
+    assert [frames[0].sequence for frames, _ in sequences] == expected
+    frames, rate = sequences[0]
+    assert [frame.key for frame in frames] == ["000/000000", "000/000001"]
+    assert rate is None
 
 
 def test_a_folder_of_scans_is_one_sequence_and_other_folders_have_to_be_named(tmp_path) -> None:
     write_scan(tmp_path / "scan.ply", Scan.of(scene(30)))
-    (sequence,) = find_sequences(tmp_path, None)
-    assert [frame.name for frame in sequence.frames] == [str(tmp_path / "scan.ply")]
+    ((frames, _),) = find_sequences(tmp_path, None)
+    assert [frame.name for frame in frames] == [str(tmp_path / "scan.ply")]
     add_scan(tmp_path / "drive", OTHERS, "0", [1, 2])
     assert find_layout(tmp_path) is None
-    (sequence,) = find_sequences(tmp_path, OTHERS)
-    assert sequence.name == "drive"
+    ((frames, _),) = find_sequences(tmp_path, OTHERS)
+    assert frames[0].sequence == "drive"
     with pytest.raises(InputError, match="no sequence in it has a folder velodyne"):
         find_sequences(tmp_path, Layout())
 
@@ -68,7 +72,7 @@ def test_the_manifest_states_rain_rates_before_the_weather_does(tmp_path) -> Non
     record(tmp_path / "sequences/002", "temperature\n9\n")
     manifest = {"made_by": MAKER, "rain_rate_mm_h": {"000": 10.0}}
     (tmp_path / "manifest.json").write_text(json.dumps(manifest))
-    rates = [sequence.rain_rate for sequence in find_sequences(tmp_path, REHEARSE3D)]
+    rates = [rate for _, rate in find_sequences(tmp_path, REHEARSE3D)]
     assert rates == [10, 11, None]
 
 
@@ -76,19 +80,23 @@ def test_a_rain_gauge_that_fails_is_not_heeded_and_a_damaged_record_is_named(tmp
     for name, rates in {"000": "nan\n9\ninf", "001": "nan"}.items():
         add_scan(tmp_path / name, REHEARSE3D, "000000", [0])
         record(tmp_path / name, f"rain_rate_mm_h\n{rates}\n")
-    rates = [sequence.rain_rate for sequence in find_sequences(tmp_path, REHEARSE3D)]
+    rates = [rate for _, rate in find_sequences(tmp_path, REHEARSE3D)]
     assert rates == [9, None]
     record(tmp_path / "000", "rain_rate_mm_h\nwet\n")
     with pytest.raises(InputError, match=r"000000\.csv: cannot be read"):
         find_sequences(tmp_path, REHEARSE3D)
 
 
+def counted(frames: Sequence[Frame]) -> Contents:
+    return Contents.from_json(FrameCounting().value(whole(frames)))
+
+
 def test_points_are_counted_by_class_and_instances_are_not(tmp_path) -> None:
     add_scan(tmp_path, REHEARSE3D, "0", [3, 0, 3, 300, 7])
     path = tmp_path / "lidar_radar_labels/0.label"
     write_labels(path, np.array([3, 0, 3, 300, 7]), np.arange(5))
-    (sequence,) = find_sequences(tmp_path, REHEARSE3D)
-    contents = count_frame(sequence.frames[0])
+    ((frames, _),) = find_sequences(tmp_path, REHEARSE3D)
+    contents = counted(frames)
     assert (contents.scans, contents.points) == (1, 5)
     assert contents.labelled == {0: 1, 3: 2, 7: 1, 300: 1}
     assert contents.as_dict({3: "rain", 0: "background", 7: "road"})["class_share"] == {
@@ -98,7 +106,7 @@ def test_points_are_counted_by_class_and_instances_are_not(tmp_path) -> None:
         "class 300": 0.2,
     }
     path.unlink()
-    unlabelled = count_frame(frame_of(sequence.frames[0].path))
+    unlabelled = counted([frame_of(frames[0].path)])
     assert (unlabelled.points, unlabelled.labelled.total()) == (5, 0)
     assert unlabelled.as_dict({})["class_share"] == {}
 
