@@ -106,8 +106,6 @@ def uploaded(place: Place, stamps: dict[str, str]) -> Iterator[Path]:
     if not is_url(place):
         yield Path(place)
         return
-    with ExitStack() as stack:
-        with writing(Path(gettempdir())):
-            folder = stack.enter_context(temporary_folder(Path(gettempdir())))
-        yield folder
-        stamps |= upload(folder, str(place))
+    with mirror() as lent:
+        yield lent.root
+        stamps |= upload(lent.root, str(place))
