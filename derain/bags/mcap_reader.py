@@ -5,7 +5,7 @@ from array import array
 from collections import Counter
 from collections.abc import Collection, Container, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
@@ -26,18 +26,18 @@ class McapConnection:
     Attributes:
         topic: Name of the topic.
         msgtype: Type of its messages, such as ``sensor_msgs/msg/PointCloud2``.
-        msgcount: Number of messages, over all files.
         encoding: Name of the encoding, such as ``cdr``.
         notes: Names and values of the channel's metadata, such as quality of service.
         schema: Name, encoding and content of the definition of the type; None without one.
+        msgcount: Number of messages, over all files; it does not make a connection another one.
     """
 
     topic: str
     msgtype: str
-    msgcount: int
     encoding: str
     notes: tuple[tuple[str, str], ...]
     schema: tuple[str, str, bytes] | None
+    msgcount: int = field(default=0, compare=False)
 
 
 class ChunkPlace(NamedTuple):
@@ -107,7 +107,6 @@ class McapFile:
             found[number] = McapConnection(
                 channel.topic,
                 _long_name(name),
-                0,
                 channel.message_encoding,
                 tuple(channel.metadata.items()),
                 None if schema is None else (name, schema.encoding, bytes(schema.data)),
@@ -267,10 +266,10 @@ class McapReader:
     @property
     def connections(self) -> list[McapConnection]:
         """Its connections, in the order of the files."""
-        counts: dict[McapConnection, int] = {}
+        counts = Counter[McapConnection]()
         for file in self.files:
             for number, connection in file.connections().items():
-                counts[connection] = counts.get(connection, 0) + file.counts[number]
+                counts[connection] += file.counts[number]
         return [replace(each, msgcount=count) for each, count in counts.items()]
 
     @property
@@ -305,10 +304,9 @@ class McapReader:
         Raises:
             ValueError: A damaged file.
         """
-        wanted = {replace(each, msgcount=0): each for each in connections}
+        wanted = set(connections)
         for file in self.files:
-            of_file = file.connections()
-            channels = {n: wanted[each] for n, each in of_file.items() if each in wanted}
+            channels = {n: each for n, each in file.connections().items() if each in wanted}
             for found in file.messages(channels, start or 0):
                 connection = channels[found.channel_id]
                 yield connection, found.log_time, found.data, found.publish_time, found.sequence

@@ -64,7 +64,7 @@ class McapWriter:
 
     def connection(self, like: McapConnection, topic: str | None = None) -> McapConnection:
         """A connection of this bag; see :meth:`RosbagsWriter.connection`."""
-        new = replace(like, topic=topic or like.topic, msgcount=0)
+        new = replace(like, topic=topic or like.topic)
         if new not in self._channels:
             if new.schema is not None and new.schema not in self._schemas:
                 self._schemas[new.schema] = self._writer.register_schema(*new.schema)
