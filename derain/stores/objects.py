@@ -63,11 +63,6 @@ class StoredObject:
     version: str
 
     @property
-    def name(self) -> str:
-        """Its name in messages: its URL without secrets."""
-        return without_secrets(self.url)
-
-    @property
     def path(self) -> Path:
         """The path that stands for its URL."""
         return path_of(self.url)

@@ -144,7 +144,7 @@ def test_what_cannot_be_read_is_listed_and_done_by_the_next_run(
     def fetch_others(objects: Any) -> None:
         for stored in objects.values():
             if stored.path.name == "000002.bin":
-                raise InputError(stored.name, "a request failed", "Run it again.")
+                raise InputError(stored.url, "a request failed", "Run it again.")
         fetch(objects)
 
     with monkeypatch.context() as broken:
