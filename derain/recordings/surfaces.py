@@ -6,7 +6,7 @@ import numpy as np
 
 from derain.scan import Floats, Scan
 from derain.system.cores import sleeping_threads
-from derain.views.morton import distinct_rows
+from derain.views.morton import distinct_rows, evenly
 
 with sleeping_threads():
     import small_gicp
@@ -128,8 +128,7 @@ def _points_in_reach(scan: Scan) -> Floats:
     rows, _ = distinct_rows(scan)
     distance = scan.range[rows]
     rows = rows[(distance > NEAREST) & (distance < FARTHEST)]
-    step = -(-len(rows) // MOST_REGISTERED)
-    return scan.xyz.take(rows[:: max(step, 1)], axis=0).astype(np.float64)
+    return scan.xyz.take(evenly(rows, MOST_REGISTERED), axis=0).astype(np.float64)
 
 
 def _facing(found: "small_gicp.RegistrationResult") -> float:
