@@ -45,10 +45,10 @@ class Job:
         cls,
         folder: Place,
         options: Mapping[str, Any],
-        units: Sequence[Unit],
+        units: list[UnitT],
         shard: Shard | None = None,
         anew: bool = False,
-    ) -> Self:
+    ) -> tuple[Self, list[UnitT]]:
         """Starts a job, or resumes the one of the folder.
 
         Args:
@@ -58,6 +58,9 @@ class Job:
             shard: The shard that is done now; None for all of it.
             anew: True to remove the records of another job; its results stay until they are
                 overwritten.
+
+        Returns:
+            The job, and the units that are done now, in their order.
 
         Raises:
             InputError: The folder is of a job with other options, or cannot be written.
@@ -78,7 +81,7 @@ class Job:
             )
         listed = [[unit.id, unit.size, unit.inputs] for unit in units]
         documents.write(UNITS, json.dumps(listed))
-        return begun
+        return begun, units if shard is None else shard.within(begun.shards).of(units)
 
     @classmethod
     def at(cls, folder: Place) -> Self:
@@ -114,15 +117,6 @@ class Job:
     def fingerprint(self) -> str:
         """Fingerprint of its options, 16 hexadecimal digits."""
         return sha256(json.dumps(self.options, sort_keys=True).encode()).hexdigest()[:16]
-
-    def shard_of(self, units: list[UnitT], shard: Shard | None) -> list[UnitT]:
-        """The units of a shard, in their order.
-
-        Args:
-            units: All units.
-            shard: The shard; None for all of them.
-        """
-        return units if shard is None else shard.within(self.shards).of(units)
 
     def listed(self) -> list[Unit]:
         """The units of the last command that went on with it.

@@ -78,8 +78,7 @@ def simulate_track(
         work = SequenceWork(root.absolute(), campaign)
         options = {"command": "simulate", **parameters_of(description)}
         units = [Unit(id=name, size=1, inputs="") for name in campaign.names]
-        job = Job.begin(work.root, options, units, shard)
-        to_do = job.shard_of(units, shard)
+        job, to_do = Job.begin(work.root, options, units, shard)
         outcomes = values(Task(job, work), units, to_do, executor, "simulating", "sequence")
         if outcomes is None:
             return False

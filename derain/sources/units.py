@@ -78,8 +78,7 @@ class Division:
         Raises:
             InputError: The folder is of a job with other options, or cannot be written.
         """
-        job = Job.begin(folder, options, units, self.shard, self.anew)
-        return job, job.shard_of(units, self.shard)
+        return Job.begin(folder, options, units, self.shard, self.anew)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

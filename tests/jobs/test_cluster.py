@@ -15,7 +15,7 @@ distributed = pytest.importorskip("distributed", reason="needs derain[cluster]")
 def test_a_cluster_does_the_units_of_a_job_and_repeats_one_whose_worker_dies(tmp_path) -> None:
     units = [Unit(id=str(number), size=1, inputs="") for number in range(5)]
     work = Counting(tmp_path, failing=("3",), killing_once=("1",))
-    task = Task(Job.begin(tmp_path, {"command": "count"}, units), work)
+    task = Task(Job.begin(tmp_path, {"command": "count"}, units)[0], work)
     options = {"processes": True, "dashboard_address": None, "threads_per_worker": 1}
     with (
         distributed.LocalCluster(n_workers=2, protocol="tcp://", **options) as cluster,

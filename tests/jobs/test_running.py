@@ -32,7 +32,7 @@ def out(tmp_path) -> Path:
 
 
 def begun(out: Path, units: list[Unit] = UNITS, **options: object) -> Job:
-    return Job.begin(out, {**OPTIONS, **options}, units)
+    return Job.begin(out, {**OPTIONS, **options}, units)[0]
 
 
 def tries(out: Path, unit: str) -> int:
@@ -97,7 +97,7 @@ def test_other_options_are_refused_and_named(out) -> None:
         begun(out, size=4)
     with pytest.raises(InputError, match="colour was not there and is red"):
         begun(out, colour="red")
-    anew = Job.begin(out, {**OPTIONS, "size": 4}, UNITS, anew=True)
+    anew, _ = Job.begin(out, {**OPTIONS, "size": 4}, UNITS, anew=True)
     assert next(anew.records_of(UNITS)) == (UNITS[0], None)
 
 
@@ -146,7 +146,7 @@ def test_an_executor_that_had_ended_before_is_reported(out) -> None:
 
 
 def test_the_status_names_what_is_to_be_done_again(out) -> None:
-    job = Job.begin(out, OPTIONS, UNITS, Shard(0, 5, first=1))
+    job, _ = Job.begin(out, OPTIONS, UNITS, Shard(0, 5, first=1))
     done = UNITS[:2]
     list(run(Task(job, Counting(out, failing=("drive/0",))), done))
     recorded: list[str] = []
