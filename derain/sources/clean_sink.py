@@ -1,9 +1,10 @@
 """Scans without their rain: files in a folder, and rewritten bags."""
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Self
 
@@ -68,7 +69,8 @@ class CleanSink:
         probability: bool = False,
         bags: BagOptions = BagOptions(),
     ) -> None:
-        self.destination = Destination(folder, removed, probability, bags)
+        sink = partial(CleanSink, probability=probability, bags=bags)
+        self.destination = Destination(folder, removed, sink)
         self.folder = _path_of(folder)
         self.probability = probability
         self.options = {"removed": removed is not None, "probability": probability, **asdict(bags)}
@@ -204,19 +206,17 @@ class CleanSink:
 
 @dataclass(frozen=True)
 class Destination:
-    """The folder and form in which scans are written without their rain.
+    """The folders in which scans are written without their rain, and the sinks that do it.
 
     Attributes:
         folder: The folder, a path or a URL.
         removed: Folder for the removed points of files, a path or a URL; None leaves them out.
-        probability: True if the written scans have the column ``rain_probability``.
-        bags: Options for the clouds of bags.
+        sink: Makes a sink of a folder, scans, and a folder for their removed points.
     """
 
     folder: Place
     removed: Place | None
-    probability: bool
-    bags: BagOptions
+    sink: Callable[..., CleanSink]
 
     @property
     def is_stored(self) -> bool:
@@ -242,7 +242,7 @@ class Destination:
             removed = None
             if self.removed is not None:
                 removed = stack.enter_context(uploaded(self.removed, stamps))
-            yield stack.enter_context(self._sink(folder, removed, source)), stamps
+            yield stack.enter_context(self.sink(folder, source, removed=removed)), stamps
 
     def stamps(self) -> dict[str, str]:
         """Sizes and versions of the results in stores, by path.
@@ -261,13 +261,8 @@ class Destination:
         """
         if is_url(self.folder) and (self.removed is None or is_url(self.removed)):
             return True
-        sink = self._sink(self.folder, self.removed, source)
+        sink = self.sink(self.folder, source, removed=self.removed)
         return all(path.exists() or is_url(url_of(path)) for path in sink.targets())
-
-    def _sink(self, folder: Place, removed: Place | None, source: Source) -> CleanSink:
-        return CleanSink(
-            folder, source, removed=removed, probability=self.probability, bags=self.bags
-        )
 
 
 def require_probabilities(method: Method, source: Source) -> None:

@@ -18,8 +18,7 @@ from derain.export.recorded import RecordedDerainer
 from derain.jobs.shard import Shard
 from derain.jobs.workers import WorkerPool
 from derain.recordings.posed import with_odometry
-from derain.sources.clean_sink import Destination
-from derain.sources.cleaned_bags import BagOptions
+from derain.sources.clean_sink import CleanSink, Destination
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.recent_frames import FrameInWindow
@@ -127,7 +126,7 @@ def test_each_scan_of_a_unit_has_one_outcome_whichever_fail(
     recording, bad, block, past, delay
 ) -> None:
     method = Failing(Window(past, delay), bad)
-    out = Destination("out", None, False, BagOptions())
+    out = Destination("out", None, CleanSink)
     for unit in units_of(recording, method, block):
         outcomes = list(UnitCleaning(method, "", None, out, 1.0, None).judged(unit))
         assert [frame for frame, _, _ in outcomes] == list(unit.frames)  # each when it is met
