@@ -16,7 +16,7 @@ import numpy as np
 from tqdm import tqdm
 
 from benchmarks.track_scene import scene_of_track
-from derain.annotation.scene import Correction, Scene, inside
+from derain.annotation.scene import Scene, inside
 from derain.annotation.steps import Plane, annotate, road_plane
 from derain.evaluation.counts import intersection_over_union
 from derain.evaluation.text_tables import markdown_table
@@ -114,7 +114,7 @@ def _variants(scene: Scene) -> dict[str, Scene]:
     others = {f"threshold {height:g} m": replace(scene, height=height) for height in HEIGHTS}
     for shift in SHIFTS:
         corrections = {
-            name: Correction(shift=tuple(generator.normal(0, shift, 3))) for name in scene.boxes
+            name: {"shift": tuple(generator.normal(0, shift, 3))} for name in scene.boxes
         }
         moved = replace(scene, corrections={"moved": corrections}).in_sequence("moved")
         others[f"boxes moved by {shift:g} m (standard deviation along each axis)"] = moved

@@ -15,6 +15,7 @@ in which drops are labelled. A correction may have shift, size and heading.
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.path import Path as Outline
@@ -80,21 +81,6 @@ class Rectangle:
 
 
 @dataclass(frozen=True)
-class Correction:
-    """Changes of a box in one sequence.
-
-    Attributes:
-        shift: Shift of its centre along x, y and z, metres.
-        size: Its length, width and height there, metres; None keeps them.
-        heading: Its heading there, degrees; None keeps it.
-    """
-
-    shift: Triple = (0.0, 0.0, 0.0)
-    size: Triple | None = None
-    heading: float | None = None
-
-
-@dataclass(frozen=True)
 class Box:
     """An upright box, whose points are all of one class.
 
@@ -128,15 +114,15 @@ class Box:
         inside &= np.abs(points[:, 2] - self.centre[2]) <= self.size[2] / 2
         return inside
 
-    def corrected(self, correction: Correction) -> "Box":
-        """The box with a correction applied."""
-        x, y, z = (here + shift for here, shift in zip(self.centre, correction.shift, strict=True))
-        return replace(
-            self,
-            centre=(x, y, z),
-            size=self.size if correction.size is None else correction.size,
-            heading=self.heading if correction.heading is None else correction.heading,
-        )
+    def corrected(self, shift: Triple = (0.0, 0.0, 0.0), **others: Any) -> "Box":
+        """The box with a correction applied.
+
+        Args:
+            shift: Shift of its centre along x, y and z, metres.
+            others: Its ``size`` or its ``heading`` there, where they change.
+        """
+        x, y, z = (here + by for here, by in zip(self.centre, shift, strict=True))
+        return replace(self, centre=(x, y, z), **others)
 
 
 @dataclass(frozen=True)
@@ -152,20 +138,20 @@ class Scene:
             no box are rain. The paper does not state it. The default is the distance within which
             a point counts as lying in the plane: with a smaller one parts of an uneven road become
             rain, with a greater one low drops become road.
-        corrections: Corrections of boxes, by sequence and box.
+        corrections: Corrections of boxes, by sequence and box, as :meth:`Box.corrected` takes them.
     """
 
     road: Polygon
     boxes: Mapping[str, Box] = field(default_factory=dict)
     rain_area: Polygon | None = None
     height: float = 0.1
-    corrections: Mapping[str, Mapping[str, Correction]] = field(default_factory=dict)
+    corrections: Mapping[str, Mapping[str, Mapping[str, Any]]] = field(default_factory=dict)
 
     def in_sequence(self, sequence: str) -> "Scene":
         """The scene with the boxes as corrected for a sequence."""
         corrections = self.corrections.get(sequence, {})
         boxes = {
-            name: box.corrected(corrections[name]) if name in corrections else box
+            name: box.corrected(**corrections[name]) if name in corrections else box
             for name, box in self.boxes.items()
         }
         return replace(self, boxes=boxes, corrections={})
@@ -221,16 +207,11 @@ def _box(entry: Entry) -> Box:
     return Box(values.pop("class"), **values)
 
 
-def _corrections(entry: Entry) -> dict[str, Correction]:
+def _corrections(entry: Entry) -> Any:
     """The corrections of one sequence, by box."""
-    parsers = {"boxes": lambda boxes: boxes.each(_correction)}
-    corrections: dict[str, Correction] = entry.record(parsers, required=["boxes"])["boxes"]
-    return corrections
-
-
-def _correction(entry: Entry) -> Correction:
-    parsers = {"shift": _position, "size": _size, "heading": Entry.number}
-    return Correction(**entry.record(parsers))
+    of_box = {"shift": _position, "size": _size, "heading": Entry.number}
+    parsers = {"boxes": lambda boxes: boxes.each(lambda box: box.record(of_box))}
+    return entry.record(parsers, required=["boxes"])["boxes"]
 
 
 def _class(entry: Entry) -> TrackClass:

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from derain.annotation import scene as module
 from derain.annotation.scene import (
     Box,
-    Correction,
     Rectangle,
     Scene,
     read_scene,
@@ -58,8 +57,8 @@ SCENE = Scene(
     rain_area=((0, -9), (60, -9), (60, 9), (0, 9)),
     height=0.15,
     corrections={
-        "003": {"car_1": Correction((0.2, 0, 0), (4, 2, 1), 0.0)},
-        "005": {"car_1": Correction(shift=(1, 0, 0.25))},
+        "003": {"car_1": {"shift": (0.2, 0, 0), "size": (4, 2, 1), "heading": 0.0}},
+        "005": {"car_1": {"shift": (1, 0, 0.25)}},
         "010": {},
     },
 )
