@@ -30,7 +30,7 @@ from derain.export.runtime import Derainer
 from derain.export.runtimes.session import DEFAULT_RUNTIME, FLOAT32_PRECISION, Runtime
 from derain.export.timing import processor, versions
 from derain.files import DEFAULT_COLUMNS
-from derain.filters import PointFilter
+from derain.filters import FilterDerainer
 from derain.filters.point_filter import filter_view, rain_among, rows_of
 from derain.jobs.running import Submits, Task, ValueWork, values
 from derain.scan import Bools, Scan
@@ -45,7 +45,6 @@ from derain.stores.url import Place
 from derain.system.extras import MATPLOTLIB, MissingExtraError, require
 from derain.system.notices import Notices, warn
 from derain.system.stopwatch import Stopwatch
-from derain.views.candidates import Candidates
 from derain.views.scan_issues import ScanIssue
 
 
@@ -263,17 +262,16 @@ def scored_methods(bench_entries: Sequence[BenchEntry], threads: int) -> list[Sc
         bench_entries: The methods.
         threads: Threads of views and networks; 0 takes every core this process may use.
     """
-    most = max((row.filter.neighbours for row in bench_entries if row.filter), default=0)
+    most = max((row.filter.filter.neighbours for row in bench_entries if row.filter), default=0)
     seen_by_filters = lru_cache(maxsize=1)(filter_view(most, threads))
 
-    def filtered(filter: PointFilter, candidates: Candidates | None, scan: Scan) -> Bools:
+    def filtered(derainer: FilterDerainer, scan: Scan) -> Bools:
         seen = seen_by_filters(scan)
-        return rows_of(rain_among(filter, seen, scan, candidates), seen.inverse)
+        rain = rain_among(derainer.filter, seen, scan, derainer.candidates)
+        return rows_of(rain, seen.inverse)
 
     return [
-        partial(filtered, row.filter, row.candidates)
-        if row.filter
-        else partial(_untimed, row.ready(threads))
+        partial(filtered, row.filter) if row.filter else partial(_untimed, row.ready(threads))
         for row in bench_entries
     ]
 

@@ -31,7 +31,6 @@ from derain.filters.derainer import CANDIDATES
 from derain.scan import Array, Bools, Scan
 from derain.spec import Spec
 from derain.system.stopwatch import Stopwatch
-from derain.views.candidates import Candidates
 from derain.views.scan_issues import ScanChecker
 
 # Returns which points of a scan are rain, bool (N,), and times its stages.
@@ -63,7 +62,6 @@ class BenchEntry:
         ready: Makes the method, with a number of threads.
         facts: File or parameters, from which the bench can be repeated.
         filter: The filter, where it is one: filters share one search for neighbours.
-        candidates: Bounds outside which that filter calls nothing rain, if it has any.
         spec_or_filter: Checks whether a scan suits the method: a model's Spec or a filter.
         runtime: The runtime of a model.
         usual: Makes the same model in onnxruntime in float32, where it has another runtime.
@@ -74,8 +72,7 @@ class BenchEntry:
     kind: str
     ready: Callable[[int], TimedMethod]
     facts: dict[str, Any] = field(default_factory=dict)
-    filter: PointFilter | None = None
-    candidates: Candidates | None = None
+    filter: FilterDerainer | None = None
     spec_or_filter: ScanChecker | None = None
     runtime: Runtime = field(default_factory=Runtime)
     usual: Callable[[int], TimedMethod] | None = None
@@ -215,20 +212,18 @@ def _deployable(title: str, name: str, parameters: dict[str, Any]) -> BenchEntry
 
 
 def _filter(title: str, derainer: FilterDerainer) -> BenchEntry:
-    filter, candidates = derainer.filter, derainer.candidates
+    filter = derainer.filter
     facts: dict[str, Any] = {"parameters": filter.as_dict()}
-    if candidates is not None:
-        facts[CANDIDATES] = str(candidates)
-    ready = partial(_ready_filter, filter, candidates)
-    return BenchEntry(title, filter.name, ready, facts, filter, candidates, spec_or_filter=filter)
+    if derainer.candidates is not None:
+        facts[CANDIDATES] = str(derainer.candidates)
+    ready = partial(_ready_filter, derainer)
+    return BenchEntry(title, filter.name, ready, facts, derainer, spec_or_filter=filter)
 
 
-def _ready_filter(
-    filter: PointFilter, candidates: Candidates | None, threads: int
-) -> FilterDerainer:
-    derainer = FilterDerainer(filter, threads, candidates)
-    derainer.warns = False  # a bench itself prints what is odd
-    return derainer
+def _ready_filter(derainer: FilterDerainer, threads: int) -> FilterDerainer:
+    ready = FilterDerainer(derainer.filter, threads, derainer.candidates)
+    ready.warns = False  # a bench itself prints what is odd
+    return ready
 
 
 def _model(

@@ -46,7 +46,7 @@ def test_a_row_is_called_by_its_title_else_by_its_name(tmp_path) -> None:
     rows = bench_entries([*names])
     assert [row.title for row in bench_entries("dror")] == ["dror"]
     assert [(row.title, row.kind) for row in rows] == [*names.values()]
-    assert rows[4].filter == DSOR(range_multiplier=0.1)
+    assert rows[4].filter.filter == DSOR(range_multiplier=0.1)
     assert rows[0].facts["weights"] == number_of_weights(KEPT.read_bytes())
     assert rows[0].facts[FILE_SIZE] == len(KEPT.read_bytes())
 
@@ -188,7 +188,7 @@ def test_filters_share_one_search_and_score_as_they_would_alone(labelled, monkey
     together = score(scored_methods(rows, threads=1), scans, labelled.reader.card)
     assert searches == [9, 9, 9]  # SSR looks at the most
     monkeypatch.undo()
-    alone = [FilterDerainer(row.filter, threads=1) for row in rows]
+    alone = [FilterDerainer(row.filter.filter, threads=1) for row in rows]
     apart = score(alone, scans, labelled.reader.card)
     assert [each.to_json() for each in together] == [each.to_json() for each in apart]
 
