@@ -17,9 +17,10 @@ from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS
 from derain.learning.task import Task
 from derain.scan import Scan
-from derain.sources.folders import sequence_frames
+from derain.sources.folders import frames_of, relative_keys
 from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
+from derain.sources.search import listed_scans
 from derain.sources.source import Source
 
 Part = Literal["train", "validation", "test", "predict"]
@@ -186,7 +187,8 @@ def split_source(
                 "Check the root. If only some sequences are there, give `derain fit` a "
                 "--data.split, and other commands the folders of scans.",
             )
-    return sequence_frames(folders, layout, columns)
+    scans = listed_scans(folder / layout.scans for folder in folders)
+    return frames_of(scans, layout.label_of, columns, relative_keys(scans))
 
 
 def taught_source(root: Path, manifest: Manifest, part: Part) -> Source:

@@ -20,7 +20,7 @@ from derain.sources.bag_frame import bag_frames
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame, MemoryFrame
 from derain.sources.records import Records
-from derain.sources.search import listed_scans, recordings_below, scans_or_bags
+from derain.sources.search import recordings_below, scans_or_bags
 from derain.sources.source import Frames, Source
 from derain.sources.unreadable_bag import UnreadableBag
 from derain.stores.url import is_url, paths_of
@@ -276,23 +276,6 @@ def frames_of(
         )
         places[scan.parent] += 1
     return Frames(frames)
-
-
-def sequence_frames(
-    folders: Iterable[Path], layout: Layout, columns: Sequence[str] = DEFAULT_COLUMNS
-) -> Frames:
-    """The scans of a data set's sequences.
-
-    Args:
-        folders: The sequences' folders, in order.
-        layout: Layout of the data set.
-        columns: Names of the columns of files that do not name them.
-
-    Raises:
-        InputError: A sequence without scans.
-    """
-    scans = listed_scans(folder / layout.scans for folder in folders)
-    return frames_of(scans, layout.label_of, columns, relative_keys(scans))
 
 
 def relative_keys(scans: Sequence[Path]) -> list[str]:

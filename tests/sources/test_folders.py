@@ -15,7 +15,7 @@ from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
 from derain.scan import Scan
-from derain.sources.folders import named_frames, relative_keys, sequence_frames, source_of
+from derain.sources.folders import named_frames, relative_keys, source_of
 from derain.sources.frame import MemoryFrame
 from derain.sources.search import find_layout, scan_folders
 
@@ -113,11 +113,9 @@ def test_no_warning_is_given_for_a_folder_whose_scans_are_all_taken(tmp_path, wa
 def test_labels_lie_where_the_layout_puts_them(tmp_path, layout) -> None:
     sequence = tmp_path / layout.sequences / "7"
     touch(sequence / layout.scans / "3.bin.gz", sequence / layout.labels / "3.label")
-    (frame,) = sequence_frames([sequence], layout)
+    (frame,) = named_frames([tmp_path], labelled=True, layouts=[layout])
     assert frame.label_path == sequence / layout.labels / "3.label"
     assert frame.has_labels
-    (named,) = named_frames([tmp_path], labelled=True, layouts=[layout])
-    assert named.label_path == frame.label_path
     if layout is not DRIVES:  # which no packaged card has
         (named,) = named_frames([tmp_path], labelled=True)
         assert named.label_path == frame.label_path
