@@ -130,14 +130,13 @@ def clean(
         raise InputError("method", f"{type(method).__name__} is no method", remedy)
     source = source_of(source, results=[] if isinstance(sink, CleanSink) else [sink])
     monitor = WeatherMonitor(weather, source, knows_recordings=placing is None)
-    sample = None if weather.every_scan else monitor.sample
     cleaned: dict[str, CleanedScan] = {}  # by key
     failures: dict[str, InputError] = {}  # by text: that of a bag is the same for all its clouds
     before = 0
     with nullcontext(sink) if isinstance(sink, CleanSink) else CleanSink(sink, source) as opened:
         finds_recordings = placing is not None and weather.every_scan
         work = UnitCleaning(
-            method, "", placing, opened.destination, most_removed, sample, finds_recordings
+            method, "", placing, opened.destination, most_removed, monitor.sample, finds_recordings
         )
         is_read_from_store = any(isinstance(frame, StoredFrame) for frame in source)
         if executor is not None or is_read_from_store or opened.destination.is_stored:

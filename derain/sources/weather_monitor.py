@@ -60,7 +60,7 @@ class WeatherMonitor:
         scans: Number of measured scans.
         scans_at: Number of scans at each level, by the alarm of a recording, otherwise by the scan
             alone; None stands for scans whose level is open. Empty unless every scan is measured.
-        sample: Keys of the scans to measure where not every scan is.
+        sample: Keys of the scans to measure; None measures every scan.
     """
 
     def __init__(
@@ -75,8 +75,8 @@ class WeatherMonitor:
         self._is_known = False  # whether any scan of the recording shows how far one sees
         known = options.every_scan and knows_recordings
         self._recordings = recording_numbers(source) if known else {}
-        sampled = 0 if options.every_scan else SAMPLED_SCANS
-        self.sample = frozenset(frame.key for frame in evenly_spaced(source, sampled))
+        sampled = frozenset(frame.key for frame in evenly_spaced(source, SAMPLED_SCANS))
+        self.sample = None if options.every_scan else sampled
         self._reaches: list[float] = []
 
     def add(
