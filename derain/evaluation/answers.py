@@ -133,11 +133,6 @@ class AnswersOfScan:
     answers: Answers
 
 
-def total(answers: Sequence[Answers]) -> Answers:
-    """Counts of the points of all."""
-    return sum(answers, Answers())
-
-
 def coarse_bands(answers: Answers) -> dict[str, Answers]:
     """The answers in each band of ``RANGE_EDGES``, by its name."""
     wide = band_of(np.array(FINE_EDGES))

@@ -19,7 +19,6 @@ from derain.evaluation.answers import (
     AnswersOfScan,
     answer_of,
     coarse_bands,
-    total,
 )
 from derain.evaluation.counts import ratio
 from derain.pictures import scan_pictures
@@ -56,7 +55,7 @@ def teacher_figure(scans: Sequence[AnswersOfScan], title: str) -> Figure:
     figure = scan_pictures.titled_figure(12, 4.6, title)
     by_scan, by_range = figure.subplots(1, 2, width_ratios=(3, 2))
     _draw_by_scan(by_scan, scans)
-    bands = coarse_bands(total([scan.answers for scan in scans]))
+    bands = coarse_bands(sum((scan.answers for scan in scans), Answers()))
     filled = {name: answers for name, answers in bands.items() if answers.points}
     _draw_shares(by_range, np.arange(len(filled)), list(filled.values()), width=0.8)
     by_range.set_xticks(range(len(filled)), list(filled))

@@ -19,7 +19,6 @@ from derain.evaluation.answers import (
     AnswersOfScan,
     TruthRecord,
     answer_of,
-    total,
 )
 from derain.evaluation.counts import SCORES
 from derain.evaluation.text_tables import markdown_table, number_text
@@ -75,14 +74,14 @@ def beside_persistence(data: Taught, recording: Source) -> Answers:
     """
     taught = {frame.key: frame for frame in data.frames("validation")[:MOST_EVALUATED]}
     shown = tqdm(_with_neighbours(recording, taught), "comparing", disable=None)
-    found = []
+    found = Answers()
     guard = Failures().skipping_failures
     for frame, judgement, _ in judgements(PersistenceDerainer(), shown, guard):
         if frame.key in taught:
             rain = answer_of(data.read(taught[frame.key]), data.card) == RAIN
             labelled = judgement.scan.with_label(labels_of(judgement))
-            found.append(Answers.of(labelled, TAUGHT_CARD, rain))
-    return total(found)
+            found += Answers.of(labelled, TAUGHT_CARD, rain)
+    return found
 
 
 def _with_neighbours(recording: Source, keys: Container[str]) -> list[Frame]:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from derain.evaluation.answers import Answers, AnswersOfScan, coarse_bands, total
+from derain.evaluation.answers import Answers, AnswersOfScan, coarse_bands
 from derain.evaluation.text_tables import markdown_table, number_text
 from derain.files.atomic import write_text
 from derain.pictures.answers import removed_figure, teacher_figure
@@ -85,12 +85,12 @@ class LearnResults:
     @property
     def taught(self) -> Answers:
         """The teacher's answers of all scans."""
-        return total([scan.answers for scan in self.scans])
+        return sum((scan.answers for scan in self.scans), Answers())
 
     @property
     def agreement(self) -> Answers:
         """The student's answers beside the teacher's, of the held-out scans."""
-        return total([scan.answers for scan in self.evaluated])
+        return sum((scan.answers for scan in self.evaluated), Answers())
 
     @property
     def trained_on(self) -> int:

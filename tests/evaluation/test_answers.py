@@ -14,7 +14,6 @@ from derain.evaluation.answers import (
     Answers,
     TruthRecord,
     answer_of,
-    total,
 )
 from derain.evaluation.counts import Counts
 from derain.evaluation.hard_cases import scene
@@ -33,7 +32,7 @@ def judged(scans) -> list[tuple[Scan, np.ndarray]]:
 
 
 def test_every_point_that_can_be_judged_is_counted_once(judged, card) -> None:
-    answers = total([Answers.of(scan, card, called) for scan, called in judged])
+    answers = sum((Answers.of(scan, card, called) for scan, called in judged), Answers())
     expected = np.zeros_like(answers.table)
     for scan, called in judged:
         answer = answer_of(scan, card)
@@ -60,7 +59,7 @@ def test_without_a_student_nothing_is_removed_and_of_no_points_no_share_is_defin
     scans, card
 ) -> None:
     assert Answers.of(scans[0], card).removed == 0
-    for answers in (Answers.of(scans[0].take([]), card), total([])):
+    for answers in (Answers.of(scans[0].take([]), card), Answers()):
         assert np.isnan([answers.removed, answers.rain_among_known, *answers.shares]).all()
         assert answers.agreement == Counts()
 
