@@ -17,10 +17,6 @@ from derain.system.stopwatch import Stopwatch
 from derain.views.scan_issues import ScanIssue, much_removed
 from derain.views.window import Window
 
-# The first scan is examined, and then one in this number. It takes 3 to 7 milliseconds for 116,000
-# points, a tenth of a filter's time; the scans of one sensor mostly have the same fault.
-EXAMINE_EVERY = 100
-
 
 class Method(ABC):
     """Finds the points of rain in a recording: a model, a filter, or a method of several scans.
@@ -43,7 +39,9 @@ class Method(ABC):
             the issues themselves set it to False.
     """
 
-    EXAMINE_EVERY: ClassVar[int] = EXAMINE_EVERY
+    # The first scan is examined, and then one in this number. It takes 3 to 7 milliseconds for
+    # 116,000 points, a tenth of a filter's time; the scans of one sensor mostly have one fault.
+    EXAMINE_EVERY: ClassVar[int] = 100
 
     warns: bool = True
     _scans_checked: int = 0
