@@ -15,7 +15,7 @@ from derain.cards.card import DataCard, load_card
 from derain.cards.rain_found import warn_without_rain
 from derain.errors import reason_of
 from derain.evaluation.scores import ScoredMethod, Scores, score
-from derain.export.bench.bench_entries import BenchEntry, GivenMethod, TimedMethod, bench_entries
+from derain.export.bench.bench_entries import BenchEntry, GivenMethod, bench_entries
 from derain.export.bench.cost import Effort, measure_cost
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.export.bench.report import (
@@ -44,7 +44,6 @@ from derain.spec import Spec
 from derain.stores.url import Place
 from derain.system.extras import MATPLOTLIB, MissingExtraError, require
 from derain.system.notices import Notices, warn
-from derain.system.stopwatch import Stopwatch
 from derain.views.scan_issues import ScanIssue
 
 
@@ -271,8 +270,7 @@ def scored_methods(bench_entries: Sequence[BenchEntry], threads: int) -> list[Sc
         return rows_of(rain, seen.inverse)
 
     return [
-        partial(filtered, row.filter) if row.filter else partial(_untimed, row.ready(threads))
-        for row in bench_entries
+        partial(filtered, row.filter) if row.filter else row.ready(threads) for row in bench_entries
     ]
 
 
@@ -282,10 +280,6 @@ def _overlap(method: BenchEntry, data: LabelledFrames) -> str | None:
     if not isinstance(spec, Spec):
         return None
     return training_overlap(method.title, spec, data.reader.card, data.frames)
-
-
-def _untimed(method: TimedMethod, scan: Scan) -> Bools:
-    return method(scan, Stopwatch())
 
 
 @dataclass(frozen=True)

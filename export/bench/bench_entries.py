@@ -33,8 +33,9 @@ from derain.spec import Spec
 from derain.system.stopwatch import Stopwatch
 from derain.views.scan_issues import ScanChecker
 
-# Returns which points of a scan are rain, bool (N,), and times its stages.
-TimedMethod = Callable[[Scan, Stopwatch], Bools]
+# Returns which points of a scan are rain, bool (N,). Takes the scan, and a stopwatch for its stages
+# where they are to be timed.
+TimedMethod = Callable[..., Bools]
 
 # Name of the fact that holds the bytes of a method's file.
 FILE_SIZE = "file_bytes"
@@ -272,13 +273,13 @@ class TimedFunction:
         """The method itself; a bench does not control the threads of a function."""
         return self
 
-    def __call__(self, scan: Scan, stopwatch: Stopwatch) -> Bools:
+    def __call__(self, scan: Scan, stopwatch: Stopwatch | None = None) -> Bools:
         """True for points that are rain, bool (N,).
 
         Raises:
             InputError: The function returns anything but one bool for each point.
         """
-        with stopwatch.stage("network"):
+        with (stopwatch or Stopwatch()).stage("network"):
             rain = np.asarray(self.function(scan))
         if rain.shape != (len(scan),) or rain.dtype != bool:
             raise InputError(
