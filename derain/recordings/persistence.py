@@ -103,7 +103,7 @@ class PersistenceDerainer(PlacedMethod, RecordingMethod):
         """Warnings about a scan: its places, nothing known of it, or no pose to be trusted."""
         yield from viewpoint_issues(judgement.scan)
         yield from intensity_in_places(judgement.scan, judgement.judged)
-        yield from self._recent.doubts(judgement.scan)
+        yield from self._recent.doubts.get(judgement.scan, ())
         if judgement.known is not None and not judgement.known.any() and judgement.judged.any():
             yield ScanIssue(
                 "nothing is known for sure",

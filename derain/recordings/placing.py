@@ -29,12 +29,15 @@ class PlacedFrames(RecentFrames):
     Args:
         window: Frames before and after one that are to be seen with it.
         threads: Threads that odometry may use; 0 takes every core this process may use.
+
+    Attributes:
+        doubts: Doubts about the pose of each scan.
     """
 
     def __init__(self, window: Window, threads: int = 0) -> None:
         super().__init__(window)
         self._odometry = FrameOdometry(threads)
-        self._doubts: WeakKeyDictionary[Scan, list[ScanIssue]] = WeakKeyDictionary()
+        self.doubts: WeakKeyDictionary[Scan, list[ScanIssue]] = WeakKeyDictionary()
         self._stretch = 0
         self._has_poses: bool | None = None  # whether the last frame had a pose; None before any
 
@@ -59,13 +62,9 @@ class PlacedFrames(RecentFrames):
             placed = self._placed(frame, scan)
         return self.push(frame, placed)
 
-    def doubts(self, scan: Scan) -> Iterator[ScanIssue]:
-        """Doubts about the pose of a scan."""
-        yield from self._doubts.get(scan, ())
-
     def damage(self, scan: Scan) -> Iterator[ScanIssue]:
         """The error of a damaged record of a scan's pose."""
-        yield from (doubt for doubt in self.doubts(scan) if doubt.kind == SOUGHT)
+        yield from (doubt for doubt in self.doubts.get(scan, ()) if doubt.kind == SOUGHT)
 
     def _placed(self, frame: Frame, scan: Scan) -> PlacedScan:
         pose, doubts = None, []
@@ -83,7 +82,7 @@ class PlacedFrames(RecentFrames):
             doubts.extend(registration.issues())
             self._stretch += not registration.trusted
             pose = registration.pose
-        self._doubts[scan] = doubts
+        self.doubts[scan] = doubts
         return PlacedScan(scan, None, pose, self._stretch)
 
 
