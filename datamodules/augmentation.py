@@ -2,11 +2,12 @@
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
 from derain.datamodules.user_changes import changed_as_by_users, in_sector
+from derain.files.documents import Entry
 from derain.scan import Bools, Float32s, Scan
 from derain.views.spherical_grid import ALL_AROUND, FULL_CIRCLE
 
@@ -15,6 +16,9 @@ from derain.views.spherical_grid import ALL_AROUND, FULL_CIRCLE
 # Source: modelling choices, as are the rest.
 OF_RAIN, STRONGEST, WHOLE = 0.45, 4.0, 0.4
 COARSEST = (-2.5, 0.5)
+
+# The most of what is no share.
+MOST = {"jitter": math.inf, "sector": FULL_CIRCLE}
 
 # Levels that intensities are cut to, where they are.
 FEW_LEVELS = 7
@@ -49,6 +53,9 @@ class Augmentation:
 
     Source: sporsho/3D_OutDet, dataset/_point_cloud_dataset.py, for rotation, jitter and their 0.5;
         TiagoCortinhal/SalsaNext for mirroring and dropping.
+
+    Raises:
+        InputError: A number that is negative, or a share above 1.
     """
 
     rotation_probability: float = 0.5
@@ -61,6 +68,10 @@ class Augmentation:
     sector: float = 90.0
     brightness_probability: float = 0.0
     user_probability: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            Entry("augmentation", name, value).within(0, MOST.get(name, 1))
 
     @property
     def changes_anything(self) -> bool:

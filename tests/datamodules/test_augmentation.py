@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from derain.datamodules.augmentation import Augmentation
+from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.scan import Scan
 
@@ -17,6 +18,7 @@ MIRROR = Augmentation(0, 0, mirror_probability=1)
 SECTOR = Augmentation(0, 0, sector_probability=1, sector=70)
 DROP = Augmentation(0, 0, dropping_probability=1)
 BOTH = Augmentation(rotation_probability=1, jitter_probability=1)
+CERTAINTY = st.sampled_from([0, 1])
 
 
 def street() -> Scan:
@@ -78,7 +80,7 @@ def test_a_scan_loses_any_share_of_its_points_up_to_the_largest(dropping) -> Non
     assert lost.std() == pytest.approx(dropping / 12**0.5, abs=0.02)
 
 
-@given(st.floats(-180, 180), st.floats(0, 350), st.integers(0, 2**32), st.booleans(), st.booleans())
+@given(st.floats(-180, 180), st.floats(0, 350), st.integers(0, 2**32), CERTAINTY, CERTAINTY)
 def test_what_is_seen_stays_where_a_network_looks_that_does_not_see_all_around(
     right, width, seed, turned, mirrored
 ) -> None:
@@ -158,3 +160,12 @@ def test_rain_alone_may_get_other_intensities() -> None:
             ratio = np.median(changed.intensity[rain] / scan.intensity[rain])
             seen.add("brighter" if ratio > 1 else "darker")
     assert seen == {"brighter", "darker"}
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("dropping", 2), ("mirror_probability", 1.5), ("jitter", -0.1), ("sector", 400)],
+)
+def test_numbers_that_no_scan_can_be_changed_by_are_refused(option, value) -> None:
+    with pytest.raises(InputError, match=option):
+        Augmentation(**{option: value})
