@@ -96,7 +96,8 @@ def train(arguments: list[str]) -> int:
     try:
         trainer = run_trainer(words, EXAMPLES[arguments[0]], callbacks).trainer
     except InputError as error:
-        raise error.renaming_option("--columns", "--data.loading.columns") from error
+        renamed = error.renaming_option("--columns", "--data.loading.columns")
+        raise renamed.renaming_option("--card", "--data.card") from error
     best = getattr(trainer.checkpoint_callback, "best_model_path", "")
     if arguments[0] == "fit" and best and trainer.is_global_zero:
         print_lines(f"Best checkpoint: {best}")
