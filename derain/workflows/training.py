@@ -167,11 +167,21 @@ class DerainCLI(LightningCLI):
         """Takes the model's class and arguments from the checkpoint, as Lightning does.
 
         Lightning would import whatever class the file names; here it is that of the registry.
+
+        Raises:
+            InputError: A training is to go on from a checkpoint of another network.
         """
         config = self.config[self.config.subcommand]
         path = config.get("ckpt_path")
         if path not in (None, *FOUND_BY_LIGHTNING):
             network, arguments = network_of_checkpoint(Path(path))
+            chosen = config.model.class_path.rpartition(".")[2]
+            if self._method == "fit" and chosen != network.__name__:
+                raise InputError(
+                    path,
+                    f"a checkpoint of {network.__name__}, from which no {chosen} can go on",
+                    "Resume with the configuration of its training.",
+                )
             model = {"class_path": class_path(network), "dict_kwargs": arguments}
             try:
                 self.config = self.parser.parse_object(

@@ -77,6 +77,15 @@ def test_a_training_that_diverges_is_one_line_and_leaves_no_checkpoint_of_it(
         load_model(path)
 
 
+def test_no_training_goes_on_from_another_network(succeed, refused, wads) -> None:
+    succeed("fit", *wads, "--trainer.max_epochs", "1")
+    last = "runs/outdet_wads/version_0/checkpoints/last.ckpt"
+    line = refused("fit", *wads, "--config", "salsanext_wads.yaml", "--ckpt_path", last)
+    assert last in line
+    assert "OutDet" in line
+    assert "SalsaNext" in line
+
+
 def test_no_training_goes_on_from_weights_alone(refused, wads, checkpoint) -> None:
     line = refused("fit", *wads, "--ckpt_path", checkpoint)
     reason = "holds weights alone, without the state of a training to resume"
