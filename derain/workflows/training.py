@@ -80,6 +80,9 @@ LEAST = {
     "errors.pictures": 0,
 }
 
+# Precisions in which the weights stay float32. Lightning converts no batch of derain's to another.
+PRECISIONS = ("32", "32-true", "16", "16-mixed", "bf16", "bf16-mixed")
+
 # Where a training's folder has its checkpoints, and its configuration.
 CHECKPOINTS, CONFIGURATION = "checkpoints", "config.yaml"
 
@@ -197,6 +200,13 @@ class DerainCLI(LightningCLI):
             value = config.get(option)
             if isinstance(value, int) and not isinstance(value, bool):  # a seed may be
                 Entry(f"--{option}", "", value).whole(least, LARGEST_SEED)
+        precision = config.get("trainer.precision")
+        if precision is not None and str(precision) not in PRECISIONS:
+            raise InputError(
+                "--trainer.precision",
+                f"the weights cannot be {precision}",
+                f"Choose one of {', '.join(PRECISIONS)}.",
+            )
         arguments = config.model.get("init_args") or {}
         check_hyperparameters(
             {name: Entry(f"--model.{name}", "", value) for name, value in arguments.items()}

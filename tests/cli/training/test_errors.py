@@ -27,6 +27,7 @@ FIT = ("fit", "--config", "outdet_simulated.yaml")
         ("--panels.pictures", "-1", "--panels.pictures: "),
         ("--trainer.accumulate_grad_batches", "0", "--trainer.accumulate_grad_batches: "),
         ("--trainer.max_epochs", "-3", "--trainer: `max_epochs` must be"),
+        ("--trainer.precision", "bf16-true", "--trainer.precision: "),
     ],
 )
 def test_an_option_is_refused_in_a_line(last_line, option, value, message) -> None:
