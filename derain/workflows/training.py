@@ -59,7 +59,6 @@ from derain.workflows.start import START_HELP, checkpoint_of
 from derain.workflows.training_errors import (
     as_input_error,
     known_options,
-    of_the_trainer,
     refusals_in_a_line,
 )
 
@@ -226,15 +225,8 @@ class DerainCLI(LightningCLI):
                 logger.init_args[name] = value
 
     def instantiate_trainer(self, **kwargs: Any) -> Trainer:
-        """Makes the trainer, which writes its checkpoints whole or not at all.
-
-        Raises:
-            InputError: Options that no trainer can be made with.
-        """
-        try:
-            return save_whole(super().instantiate_trainer(**processes_of_torchrun(), **kwargs))
-        except (ValueError, TypeError) as error:  # Lightning checks some options in these ways
-            raise of_the_trainer(error) from error
+        """Makes the trainer, which writes its checkpoints whole or not at all."""
+        return save_whole(super().instantiate_trainer(**processes_of_torchrun(), **kwargs))
 
     def instantiate_classes(self) -> None:
         """Instantiates data, model and trainer; what they find wrong is not the parser's error."""

@@ -2,11 +2,11 @@
 
 import difflib
 import re
+import traceback
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 
 from jsonargparse import ArgumentParser
-from lightning.fabric.utilities.exceptions import MisconfigurationException
 
 from derain.errors import InputError
 from derain.models.former_names import FORMER_OPTIONS
@@ -102,11 +102,6 @@ def _unusable(subject: str, message: str) -> InputError:
     return InputError(subject, f"cannot be {value['value']}", f"Give: {' or '.join(kinds)}.")
 
 
-def of_the_trainer(error: Exception) -> InputError:
-    """One line for options that Lightning's trainer refuses; it names them itself."""
-    return InputError("--trainer", str(error).rstrip(".!"), HINT)
-
-
 @contextmanager
 def refusals_in_a_line() -> Iterator[None]:
     """Turns what Lightning or the system refuses, before a training or in it, into one line.
@@ -116,13 +111,19 @@ def refusals_in_a_line() -> Iterator[None]:
     """
     try:
         yield
-    except MisconfigurationException as error:
-        raise of_the_trainer(error) from error
-    except OSError as error:
-        if error.errno is None:  # Lightning raises errors of its own as the system's
+    except Exception as error:
+        if _raised_by_lightning(error):
+            raise InputError("--trainer", str(error).rstrip(".!"), HINT) from error
+        if not isinstance(error, OSError) or error.errno is None:
             raise
         raise InputError(
             error.filename or "the run's folder",
             f"cannot be written ({error.strerror})",
             "Choose a folder that is writable and has room: --trainer.logger.save_dir.",
         ) from error
+
+
+def _raised_by_lightning(error: Exception) -> bool:
+    """True if Lightning itself refuses something, such as an option; its messages name it."""
+    *_, (frame, _) = traceback.walk_tb(error.__traceback__)
+    return frame.f_globals.get("__name__", "").startswith("lightning.")

@@ -52,11 +52,30 @@ def test_a_configuration_is_refused_in_a_line(last_line, content, message) -> No
     assert not Path("runs").exists()
 
 
-def test_the_remedy_for_columns_is_an_option_of_training(last_line) -> None:
-    Path("scan.bin").write_bytes(bytes(36))
-    Path("scan.label").write_bytes(bytes(8))
-    data = ("--data", "Folder", "--data.root", ".", "--data.card", "wads")
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--trainer.val_check_interval", "100"),
+        ("--trainer.callbacks", "EarlyStopping", "--trainer.callbacks.monitor", "nonsense"),
+    ],
+)
+def test_what_lightning_refuses_of_the_data_or_the_model_is_one_line(
+    last_line, wads, options
+) -> None:
+    line = last_line("fit", *wads, "--trainer.max_epochs", "1", *options)
+    assert line.startswith("--trainer: ")
+    assert options[-1] in line
+
+
+@pytest.mark.parametrize(
+    ("labels", "option"),
+    [(bytes(8), "--data.loading.columns"), (b"\x63" + bytes(11), "--data.card")],
+)
+def test_the_remedy_for_labels_names_an_option_of_training(last_line, labels, option) -> None:
+    Path("scan.bin").write_bytes(bytes(48))
+    Path("scan.label").write_bytes(labels)
+    data = ("--data", "Folder", "--data.root", ".", "--data.card", "rehearse3d")
     parts = ("--data.train", "['scan.bin']", "--data.validation", "['scan.bin']")
     line = last_line("fit", "--model", "OutDet", *data, *parts)
-    assert "--data.loading.columns" in line
-    assert " --columns" not in line
+    assert option in line
+    assert f" --{option.rpartition('.')[2]}" not in line
