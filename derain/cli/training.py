@@ -70,7 +70,7 @@ def _short_help(command: str) -> str:
 
 
 def train(arguments: list[str]) -> int:
-    """Runs one of the four commands; after a training, prints how to export its best checkpoint.
+    """Runs one of the four commands; after a training, prints how to export its checkpoint.
 
     Args:
         arguments: The command and its options.
@@ -89,7 +89,7 @@ def train(arguments: list[str]) -> int:
     require(arguments[0], *TRAINING_LIBRARIES)
     from derain.cli.outputs import print_lines
     from derain.workflows.progress import EpochLines
-    from derain.workflows.training import run_trainer
+    from derain.workflows.training import checkpoint_of_run, run_trainer
 
     words = ["--help" if argument == ALL else argument for argument in arguments]
     callbacks = {"callbacks": [EpochLines()]}
@@ -98,8 +98,8 @@ def train(arguments: list[str]) -> int:
     except InputError as error:
         renamed = error.renaming_option("--columns", "--data.loading.columns")
         raise renamed.renaming_option("--card", "--data.card") from error
-    best = getattr(trainer.checkpoint_callback, "best_model_path", "")
-    if arguments[0] == "fit" and best and trainer.is_global_zero:
-        print_lines(f"Best checkpoint: {best}")
-        print_lines(f"derain export {shlex.quote(best)} --out model.onnx")
+    checkpoint = checkpoint_of_run(trainer)
+    if arguments[0] == "fit" and checkpoint is not None and trainer.is_global_zero:
+        print_lines(f"Checkpoint: {checkpoint}")
+        print_lines(f"derain export {shlex.quote(str(checkpoint))} --out model.onnx")
     return 0

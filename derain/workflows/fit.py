@@ -8,10 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lightning.pytorch.callbacks import ModelCheckpoint
-
 from derain.workflows.progress import EpochLines
-from derain.workflows.training import quiet_lightning, run_trainer
+from derain.workflows.training import checkpoint_of_run, quiet_lightning, run_trainer
 
 
 @dataclass(frozen=True)
@@ -19,12 +17,13 @@ class FitResults:
     """A finished training.
 
     Attributes:
-        checkpoint: The best checkpoint.
+        checkpoint: The best checkpoint, or the last where no validation chose one; None where none
+            was saved.
         folder: Folder of the logs and the configuration; None without a logger.
         metrics: Values that the last epoch logged, by name.
     """
 
-    checkpoint: Path
+    checkpoint: Path | None
     folder: Path | None
     metrics: Mapping[str, float]
 
@@ -65,10 +64,8 @@ def fit(
     defaults = {"enable_progress_bar": False, "callbacks": [EpochLines()]} if quiet else {}
     with quiet_lightning() if quiet else nullcontext():
         trainer = run_trainer(["fit", *options], trainer=defaults).trainer
-    best = trainer.checkpoint_callback
-    assert isinstance(best, ModelCheckpoint)  # every run has one
     return FitResults(
-        Path(best.best_model_path),
+        checkpoint_of_run(trainer),
         None if trainer.log_dir is None else Path(trainer.log_dir),
         {name: float(value) for name, value in trainer.callback_metrics.items()},
     )

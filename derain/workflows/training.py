@@ -326,6 +326,13 @@ def run_trainer(
         )
 
 
+def checkpoint_of_run(trainer: Trainer) -> Path | None:
+    """The best checkpoint of a run, or its last where no validation chose one; None without any."""
+    callbacks = trainer.checkpoint_callbacks  # the best one's first
+    paths = [each.best_model_path for each in callbacks if isinstance(each, ModelCheckpoint)]
+    return next((Path(path) for path in paths if path), None)
+
+
 @contextmanager
 def quiet_lightning() -> Iterator[None]:
     """Hides Lightning's messages and advice, such as what hardware it found, in the block."""

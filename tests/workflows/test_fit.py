@@ -22,14 +22,15 @@ def test_settings_are_options_of_the_command() -> None:
     )
 
 
-@pytest.mark.usefixtures("one_block")
-def test_a_training_returns_its_best_checkpoint_and_score(tmp_path, capsys) -> None:
+@pytest.fixture
+def settings(tmp_path, one_block) -> dict[str, object]:
+    """Settings for one epoch of a data set in the layout of WADS, of two sequences."""
     for sequence in ("00", "01"):
         folder = tmp_path / "WADS/sequences" / sequence
         (folder / "velodyne").mkdir(parents=True)
         scene(300).tofile(folder / "velodyne/0.bin")
         write_labels(folder / "labels/0.label", np.where(np.arange(300) < 270, 0, 110))
-    settings = {
+    return {
         "data.root": tmp_path / "WADS",
         "data.split": {"train": ["00"], "validation": ["01"], "test": []},
         "data.loading.workers": 0,
@@ -37,6 +38,9 @@ def test_a_training_returns_its_best_checkpoint_and_score(tmp_path, capsys) -> N
         "trainer.logger.save_dir": tmp_path / "runs",
         "panels.scans": 0,
     }
+
+
+def test_a_training_returns_its_best_checkpoint_and_score(settings, tmp_path, capsys) -> None:
     results = fit("outdet_wads.yaml", settings, quiet=True)
     assert load_model(results.checkpoint).spec.network == "outdet"
     assert results.folder == tmp_path / "runs/outdet_wads/version_0"
@@ -44,6 +48,16 @@ def test_a_training_returns_its_best_checkpoint_and_score(tmp_path, capsys) -> N
     assert capsys.readouterr().out == ""
     with pytest.raises(InputError, match=r"data\.rot: no such option"):
         fit("outdet_wads.yaml", {"data.rot": "WADS"})
+
+
+@pytest.mark.parametrize(
+    ("option", "name"), [("trainer.limit_val_batches", "last.ckpt"), ("trainer.max_epochs", None)]
+)
+def test_without_a_validation_the_checkpoint_is_the_last_if_there_is_any(
+    settings, option, name
+) -> None:
+    checkpoint = fit("outdet_wads.yaml", {**settings, option: 0}, quiet=True).checkpoint
+    assert (checkpoint and checkpoint.name) == name
 
 
 def test_without_rain_to_validate_on_there_is_no_iou() -> None:
