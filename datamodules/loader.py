@@ -62,7 +62,7 @@ def scan_loader(
         raise InputError(
             "augmentation",
             "would turn a scan but not the scans around it, which the network also sees",
-            "Set rotation_probability and mirror_probability to 0.",
+            "Set rotation_probability, mirror_probability and user_probability to 0.",
         )
     reader = loading.reader(task.card, task.columns)
     augmented = part == "train" and loading.augmentation.changes_anything
