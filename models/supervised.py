@@ -1,5 +1,6 @@
 """The base class of derainers that learn from labels: their loss."""
 
+import math
 import sys
 from collections.abc import Sequence
 
@@ -9,6 +10,7 @@ from torch import Tensor
 
 from derain.cards.card import DataCard
 from derain.cards.rain_found import require_rain
+from derain.errors import InputError
 from derain.learning.batch import Batch
 from derain.learning.losses import SegmentationLoss, class_weights, segmentation_loss
 from derain.learning.task import Task, TrainingData
@@ -118,12 +120,22 @@ def one_cycle(model: SupervisedModule, final_share: float = 0.0) -> OptimizerLRS
 
     Source: L. N. Smith and N. Topin, "Super-Convergence: Very Fast Training of Neural Networks
         Using Large Learning Rates", 2018.
+
+    Raises:
+        InputError: A training without a last step.
     """
+    steps = model.trainer.estimated_stepping_batches
+    if steps == math.inf:
+        raise InputError(
+            "--trainer.max_epochs",
+            "without it, the learning rate cannot be planned to the last step",
+            "Give it, or --trainer.max_steps.",
+        )
     rate = model.hparams["learning_rate"]
     optimizer = torch.optim.AdamW(
         model.parameters(), lr=rate, weight_decay=model.hparams["weight_decay"]
     )
-    steps = max(int(model.trainer.estimated_stepping_batches), 2)
+    steps = max(int(steps), 2)
     schedule = torch.optim.lr_scheduler.OneCycleLR(
         optimizer,
         rate,

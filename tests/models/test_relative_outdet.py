@@ -168,6 +168,13 @@ def test_too_small_a_neighbourhood_is_refused() -> None:
         RelativeOutDet(neighbours=3)
 
 
+def test_a_learning_rate_of_one_cycle_needs_a_last_step() -> None:
+    model = RelativeOutDet()
+    model.trainer = SimpleNamespace(estimated_stepping_batches=float("inf"))
+    with pytest.raises(InputError, match="max_epochs"):
+        one_cycle(model)
+
+
 @pytest.mark.parametrize("steps", [1, 2, 9, 10, 11, 40])
 def test_a_learning_rate_of_one_cycle_begins_low_however_short_the_training(steps) -> None:
     model = RelativeOutDet()
