@@ -73,10 +73,12 @@ LOGGERS = ("lightning.pytorch", "lightning.fabric")
 LEAST = {
     "seed_everything": 0,
     "trainer.accumulate_grad_batches": 1,
+    "trainer.check_val_every_n_epoch": 1,
     "trainer.log_every_n_steps": 0,
     "panels.scans": 0,
     "panels.pictures": 0,
     "errors.pictures": 0,
+    "scan_check.scans": 0,
 }
 
 # Precisions in which the weights stay float32. Lightning converts no batch of derain's to another.

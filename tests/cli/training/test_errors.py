@@ -26,6 +26,8 @@ FIT = ("fit", "--config", "outdet_simulated.yaml")
         ("--trainer.strategy", "foo", "strategy"),
         ("--panels.pictures", "-1", "--panels.pictures: "),
         ("--trainer.accumulate_grad_batches", "0", "--trainer.accumulate_grad_batches: "),
+        ("--trainer.check_val_every_n_epoch", "0", "--trainer.check_val_every_n_epoch: "),
+        ("--scan_check.scans", "-1", "--scan_check.scans: "),
         ("--trainer.max_epochs", "-3", "--trainer: `max_epochs` must be"),
         ("--trainer.precision", "bf16-true", "--trainer.precision: "),
     ],
