@@ -112,18 +112,19 @@ def refusals_in_a_line() -> Iterator[None]:
     try:
         yield
     except Exception as error:
+        if isinstance(error, OSError) and error.errno is not None:  # Lightning raises others
+            raise InputError(
+                error.filename or "the run's folder",
+                f"cannot be written ({error.strerror})",
+                "Choose a folder that is writable and has room: --trainer.logger.save_dir.",
+            ) from error
         if _raised_by_lightning(error):
             raise InputError("--trainer", str(error).rstrip(".!"), HINT) from error
-        if not isinstance(error, OSError) or error.errno is None:
-            raise
-        raise InputError(
-            error.filename or "the run's folder",
-            f"cannot be written ({error.strerror})",
-            "Choose a folder that is writable and has room: --trainer.logger.save_dir.",
-        ) from error
+        raise
 
 
 def _raised_by_lightning(error: Exception) -> bool:
     """True if Lightning itself refuses something, such as an option; its messages name it."""
     *_, (frame, _) = traceback.walk_tb(error.__traceback__)
-    return frame.f_globals.get("__name__", "").startswith("lightning.")
+    module: str = frame.f_globals.get("__name__", "")
+    return module.startswith("lightning.")
