@@ -54,6 +54,9 @@ class LearnConfig:
             where a network is named, or one without intensity is wanted, and else begins with
             the model that comes with derain.
         topic: Topic of the bags; None where each has only one of clouds.
+
+    Raises:
+        InputError: No epoch.
     """
 
     recordings: Sequence[Path]
@@ -68,6 +71,10 @@ class LearnConfig:
     card: str | None = None
     start: str | None = None
     topic: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.epochs is not None and self.epochs < 1:
+            raise InputError("epochs", f"{self.epochs} is too few", "Give 1 or more.")
 
     @property
     def begins_with(self) -> str | None:

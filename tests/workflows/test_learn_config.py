@@ -137,3 +137,8 @@ def test_odometry_is_needed_where_there_are_no_poses(tmp_path) -> None:
     assert [needed(*each) for each in [*given, ("dror", None)]] == [True, False, False, True, False]
     (tmp_path / "drive/poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * 3)
     assert [needed(*each) for each in given] == [False, False, False, True]
+
+
+def test_a_training_without_an_epoch_is_refused() -> None:
+    with pytest.raises(InputError, match="epochs"):
+        LearnConfig([Path("drive")], Path("model.onnx"), epochs=0)
