@@ -2,7 +2,8 @@
 
 import os
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from copy import deepcopy
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from derain.models.lisnownet import LiSnowNet
     from derain.models.outdet import OutDet
     from derain.models.salsanext import SalsaNextModule
+    from derain.views.candidates import Candidates
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 
@@ -75,10 +77,10 @@ def full_disk() -> Iterator[Callable[[], None]]:
     resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-@pytest.fixture
-def small_world(open3d, tmp_path) -> Path:
+@pytest.fixture(scope="session")
+def small_world(open3d, tmp_path_factory) -> Path:
     """A world that is quick to simulate: a bare street in the snow, seen by few beams."""
-    path = tmp_path / "small.yaml"
+    path = tmp_path_factory.mktemp("world") / "small.yaml"
     path.write_text(
         "places: {street: 1}\nhorizon: 0\ncarrier: 0\n"
         "sensors: {kinds: {front: 1}, front_rows: [32], front_step: [0.5, 1.0]}\n"
@@ -198,6 +200,21 @@ def onnx_model(random_outdet, made_once) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("derain.models.outdet.network.BLOCKS", 2)
         return made_once("outdet.onnx", partial(export, random_outdet))
+
+
+@pytest.fixture(scope="session")
+def judging(random_outdet, made_once) -> "Callable[[str, Candidates, int], Path]":
+    """Exports the same network under a name, in so many blocks, with candidates."""
+    from derain.export.onnx_file import export
+
+    def exported(name: str, candidates: "Candidates", blocks: int) -> Path:
+        model = deepcopy(random_outdet)
+        model.adopt(replace(model.spec, candidates=candidates))
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("derain.models.outdet.network.BLOCKS", blocks)
+            return made_once(name, partial(export, model))
+
+    return exported
 
 
 @pytest.fixture(scope="session")
@@ -327,3 +344,26 @@ def changed_model(onnx_model, tmp_path) -> Callable[[dict[str, Any]], Path]:
         return path
 
     return change
+
+
+@pytest.fixture
+def in_this_process(monkeypatch) -> None:
+    """Times methods in this process; that each has its own is tested by itself."""
+    from derain.export.bench import bench
+    from derain.export.bench.cost import measure_in_process
+
+    monkeypatch.setattr(bench, "measure_cost", measure_in_process)
+
+
+@pytest.fixture
+def stand_in_for_derain(tmp_path, monkeypatch) -> "Callable[[ModuleType, str], Path]":
+    """Puts a script in the place of derain, and returns where it records its calls."""
+
+    def put(caller: "ModuleType", script: str) -> Path:
+        stand_in, calls = tmp_path / "derain", tmp_path / "calls.txt"
+        stand_in.write_text(f'#!/bin/sh\necho "$@" >> "{calls}"\n{script}')
+        stand_in.chmod(0o755)
+        monkeypatch.setattr(caller, "DERAIN", stand_in)
+        return calls
+
+    return put

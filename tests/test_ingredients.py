@@ -24,8 +24,6 @@ variants:
 
 # Stands in for derain: writes what its options name, and refuses --broken.
 STAND_IN = """\
-#!/bin/sh
-echo "$@" >> "{calls}"
 case "$*" in *--broken*) exit 2;; esac
 while [ $# -gt 0 ]; do
   if [ "$1" = --out ]; then mkdir -p "$(dirname "$2")"; echo made > "$2"; fi
@@ -35,13 +33,9 @@ done
 
 
 @pytest.fixture
-def calls(tmp_path, monkeypatch) -> Path:
+def calls(stand_in_for_derain) -> Path:
     """A file that records how derain was called."""
-    stand_in, calls = tmp_path / "derain", tmp_path / "calls.txt"
-    stand_in.write_text(STAND_IN.format(calls=calls))
-    stand_in.chmod(0o755)
-    monkeypatch.setattr(ingredients, "DERAIN", stand_in)
-    return calls
+    return stand_in_for_derain(ingredients, STAND_IN)
 
 
 @pytest.fixture

@@ -12,8 +12,6 @@ from derain.errors import InputError
 
 # Stands in for derain: writes the checkpoint that its options name, and fails where broken.txt is.
 STAND_IN = """\
-#!/bin/sh
-echo "$@" >> "{calls}"
 while [ "$1" != --trainer.logger.init_args.save_dir ]; do shift; done
 mkdir -p "$2/name/version_0/checkpoints"; echo trained > "$2/name/version_0/checkpoints/last.ckpt"
 [ ! -e "{broken}" ]
@@ -23,13 +21,9 @@ THRESHOLDS = (0.3, 0.4, 0.5, 0.6)
 
 
 @pytest.fixture
-def calls(tmp_path, monkeypatch) -> Path:
+def calls(tmp_path, stand_in_for_derain) -> Path:
     """A file that records how derain was called."""
-    stand_in, calls = tmp_path / "derain", tmp_path / "calls.txt"
-    stand_in.write_text(STAND_IN.format(calls=calls, broken=tmp_path / "broken.txt"))
-    stand_in.chmod(0o755)
-    monkeypatch.setattr(make_default, "DERAIN", stand_in)
-    return calls
+    return stand_in_for_derain(make_default, STAND_IN.format(broken=tmp_path / "broken.txt"))
 
 
 def test_a_training_that_ended_is_not_begun_again(calls, tmp_path) -> None:
@@ -75,12 +69,3 @@ def test_a_threshold_is_raised_as_far_as_clean_scans_ask_and_it_may(iou, taken) 
     else:  # none would do: as little as may be is taken
         assert not bearable & affordable
         assert threshold == max(affordable)
-
-
-def test_thresholds_by_hand() -> None:
-    iou = dict(zip(THRESHOLDS, (0.7, 0.8, 0.79, 0.5), strict=True))
-    assert chosen(iou, {}) == 0.4
-    assert chosen(iou, {"clean": dict.fromkeys(THRESHOLDS, 0.0)}) == 0.4
-    falling = dict(zip(THRESHOLDS, (1.0, 0.5, MOST_TAKEN, 0.0), strict=True))
-    assert chosen(iou, {"clean": falling}) == 0.5
-    assert chosen(iou, {"clean": dict.fromkeys(THRESHOLDS, 1.0)}) == 0.5

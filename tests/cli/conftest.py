@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from recorded_scenes import write_wads
 
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
@@ -29,15 +30,12 @@ def write_labelled() -> WriteScan:
 
 
 @pytest.fixture
-def wads(tmp_path, write_labelled) -> list[str]:
+def wads(tmp_path) -> list[str]:
     """Options for a data set in the layout of WADS, of three sequences of one scan each.
 
     Nothing is drawn of a training.
     """
-    root = tmp_path / "WADS"
-    for sequence in ("00", "01", "02"):
-        folder = root / "sequences" / sequence
-        write_labelled(folder / "velodyne/0.bin", folder / "labels/0.label", rain=110)
+    root = write_wads(tmp_path / "WADS", "00", "01", "02")
     split = '{train: ["00"], validation: ["01"], test: ["02"]}'
     return [
         *("--config", "outdet_wads.yaml", "--data.root", str(root), "--data.split", split),

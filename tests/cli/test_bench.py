@@ -10,7 +10,6 @@ import yaml
 
 from derain.evaluation.hard_cases import scene
 from derain.export.bench import bench
-from derain.export.bench.cost import measure_in_process
 from derain.export.runtime import Derainer
 from derain.files.labels import write_labels
 from derain.simulation.campaign import MAKER
@@ -19,15 +18,11 @@ FILES = ["bench.csv", "bench.json", "bench.md", "speed_error.png"]
 METHODS = ["dror", "position", "intensity", "all", "none"]
 ONCE = ["--timed", "1", "--repeats", "1"]
 
+pytestmark = pytest.mark.usefixtures("in_this_process")
+
 
 def read_report(folder: Path) -> dict[str, Any]:
     return json.loads((folder / "bench.json").read_text())
-
-
-@pytest.fixture(autouse=True)
-def in_this_process(monkeypatch) -> None:
-    """Times methods in this process; that each has its own is tested by itself."""
-    monkeypatch.setattr(bench, "measure_cost", measure_in_process)
 
 
 @pytest.fixture
@@ -154,17 +149,6 @@ def test_the_command_in_the_report_makes_the_same_figures_again(succeed, root, t
     assert len(report(again)["files"]) == 2
 
 
-def test_single_scans_are_benched_with_their_card(
-    refused, succeed, tmp_path, write_labelled
-) -> None:
-    write_labelled(tmp_path / "a.bin", tmp_path / "a.label", rain=110)
-    data = ["--data", tmp_path / "a.bin", "--card", "wads"]
-    succeed("bench", *data, "--methods", "all", *ONCE, "--out", tmp_path / "out")
-    assert "# WADS, 1 scan, 300 points" in (tmp_path / "out/bench.md").read_text()
-    line = refused("bench", *data, "--methods", "position", "--out", tmp_path / "no")
-    assert "position: it has no scans to learn from" in line
-
-
 def test_baselines_learn_nothing_from_points_that_may_be_rain_or_not(succeed, tmp_path) -> None:
     # In the voxel at 1 m all that is known is rain; were the unknown taken for dry, it would not
     # be, and neither would the dim be. At 5 m all is known.
@@ -194,6 +178,7 @@ def test_points_that_a_scan_holds_twice_are_counted_once_unless_an_option_asks_f
     assert sum(every["rows"][0]["counts"].values()) == 420
     succeed("bench", *options, "--out", tmp_path)
     assert list(read_report(tmp_path)["rows"][0]["counts"].values()) == [60, 240, 0, 0]
+    assert "# WADS, 1 scan, 300 points" in (tmp_path / "bench.md").read_text()
 
 
 def test_table_2_stands_beside_ours_for_each_part(succeed, root, tmp_path) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from recorded_scenes import write_scenes
 
 from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
@@ -18,11 +19,7 @@ from derain.views.spherical_grid import SphericalGrid
 @pytest.fixture
 def scans(tmp_path) -> Path:
     """A folder of three scans of 100, 200 and 300 points."""
-    folder = tmp_path / "scans"
-    folder.mkdir()
-    for number in (1, 2, 3):
-        scene(100 * number, seed=number).tofile(folder / f"{number:06d}.bin")
-    return folder
+    return write_scenes(tmp_path / "scans", 100, 200, 300)
 
 
 def rain_in(out: Path, stem: str = "scan") -> Bools:
@@ -39,15 +36,15 @@ def test_scans_get_their_labels_and_lose_their_rain(succeed, onnx_model, scans, 
     np.save(single, scene(50))
     outcome = succeed("run", onnx_model, scans, single, "--out", out)
     assert outcome.messages == []
-    kept = ["000001.bin", "000002.bin", "000003.bin", "single.npy"]
+    kept = ["000000.bin", "000001.bin", "000002.bin", "single.npy"]
     assert names(out) == sorted([*kept, *(f"{Path(name).stem}.label" for name in kept)])
-    rain = Derainer(onnx_model)(scene(300, seed=3))
+    rain = Derainer(onnx_model)(scene(300, seed=2))
     assert 0 < rain.sum() < 300
-    np.testing.assert_array_equal(rain_in(out, "000003"), rain)
-    assert (out / "000003.bin").read_bytes() == scene(300, seed=3)[~rain].tobytes()
+    np.testing.assert_array_equal(rain_in(out, "000002"), rain)
+    assert (out / "000002.bin").read_bytes() == scene(300, seed=2)[~rain].tobytes()
     lines = outcome.out.splitlines()
     counts = f"300 points, 300 valid, {rain.sum()} of rain ({rain.mean():.1%} of the valid), "
-    assert lines[2].startswith(f"{scans / '000003.bin'}: {counts}")
+    assert lines[2].startswith(f"{scans / '000002.bin'}: {counts}")
     assert lines[4].startswith("4 scans: 650 points, ")
 
 
@@ -76,7 +73,7 @@ def test_json_is_one_object_a_scan_and_nothing_else(succeed, onnx_model, scans, 
     [
         ["run", "ror", "{scans}", "--out", "out"],
         ["info", "{scans}"],
-        ["view", "{scans}/000001.bin", "--methods", "ror", "--out", "out.png"],
+        ["view", "{scans}/000000.bin", "--methods", "ror", "--out", "out.png"],
     ],
     ids=lambda command: command[0],
 )
@@ -101,12 +98,12 @@ def test_nothing_is_left_where_the_output_cannot_be_written(
     ("arguments", "reason"),
     [
         (["none.onnx", "scans"], "derain: none.onnx: no such method or file."),
-        (["{model}", "scans", "--out", "scans"], "would overwrite scans/000001.bin. Give --out"),
+        (["{model}", "scans", "--out", "scans"], "would overwrite scans/000000.bin. Give --out"),
         (["ror", "scans", "--parameters", "none.yaml"], "derain: none.yaml: there is no such"),
         (["ror", "scans", "--parameters", "dsor.yaml"], "dsor.yaml: holds parameters of dsor"),
         (["dsor", "scans", "--parameters", "dsor.yaml"], "dsor: it has no parameter limit."),
         (["dror", "scans", "--probability"], "dror returns which points are rain, without prob"),
-        (["{model}", "scans", "--probability"], "000001.bin: the columns of such a file have no"),
+        (["{model}", "scans", "--probability"], "000000.bin: the columns of such a file have no"),
         (["dror", "scans", "--topic", "/points"], "no bag is named"),
         (["dror", "scans", "--poses", "none.txt"], "none.txt: "),
         (["dror", "scans", "--warning", "40", "30"], "Give two numbers of metres, the second"),
@@ -121,7 +118,7 @@ def test_what_cannot_be_used_is_refused_before_any_work(
     words = [argument.format(model=onnx_model) for argument in arguments]
     out = [] if "--out" in words else ["--out", "out"]
     assert reason in refused("run", *words, *out)
-    assert names(Path("scans")) == ["000001.bin", "000002.bin", "000003.bin"]
+    assert names(Path("scans")) == ["000000.bin", "000001.bin", "000002.bin"]
     assert not Path("out").exists()
 
 
@@ -170,15 +167,15 @@ def test_cleaned_and_removed_are_the_scan_with_the_probability_as_a_column(
 
 def test_a_scan_that_would_lose_too_much_is_left_whole(run_derain, tmp_path, scans) -> None:
     spread = scene(200) * np.array([1e3, 1e3, 1e3, 1], np.float32)
-    spread.tofile(scans / "000002.bin")
+    spread.tofile(scans / "000001.bin")
     out = tmp_path / "out"
     options = ("--set", "radius=20", "--most-removed", "0.99")
     outcome = run_derain("run", "ror", scans, "--out", out, *options)
     assert outcome.code == 2
     refused, summary = outcome.err.splitlines()[-2:]
-    assert refused.startswith(f"derain: {scans / '000002.bin'}: left whole: 100.0% of its valid")
+    assert refused.startswith(f"derain: {scans / '000001.bin'}: left whole: 100.0% of its valid")
     assert summary == "derain: 1 of 3 scans could not be cleaned"
-    assert {path.stem for path in out.iterdir()} == {"000001", "000003"}
+    assert {path.stem for path in out.iterdir()} == {"000000", "000002"}
 
 
 def test_a_scan_is_projected_once_and_points_outside_the_grid_are_warned_of(

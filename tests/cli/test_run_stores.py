@@ -7,15 +7,14 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from contents import contents
+from recorded_scenes import write_drive
 from small_bags import small_bag
 
 import derain
 from benchmarks.s3_server import BUCKET, Faults, file_system, s3_server
 from derain.errors import InputError
-from derain.evaluation.hard_cases import scene
 from derain.stores.objects import fetch
 
 FAULTS = Faults()
@@ -43,16 +42,7 @@ def s3(server, monkeypatch) -> Iterator[Any]:
 @pytest.fixture
 def drive(tmp_path) -> Path:
     """A recording with poses."""
-    folder = tmp_path / "drive"
-    folder.mkdir()
-    for number in range(SCANS):
-        points = scene(200, seed=7)
-        points[:, 0] -= 0.3 * number
-        points[:20, :3] = np.random.default_rng(number).uniform(-6, 6, (20, 3))
-        points.tofile(folder / f"{number:06d}.bin")
-    poses = (f"1 0 0 {0.3 * number} 0 1 0 0 0 0 1 0" for number in range(SCANS))
-    (folder / "poses.txt").write_text("\n".join(poses))
-    return folder
+    return write_drive(tmp_path / "drive", SCANS, 200, seed=7)
 
 
 def in_store(s3: Any, folder: str) -> dict[str, bytes]:

@@ -150,14 +150,6 @@ def test_a_table_has_a_line_a_scan_and_nothing_where_nothing_is_known(
     assert rows[0]["share_at_180_deg"] == ""  # all is ahead of the sensor
 
 
-def test_a_sensor_that_returns_nothing_is_not_clear(run_derain, recording, tmp_path) -> None:
-    for number in (0, 1):
-        (recording / f"{number:06d}.bin").write_bytes(b"")
-    out = tmp_path / "out"
-    found = objects(run_derain("run", "dror", recording, "--out", out, "--json", *LEVELS).out)
-    assert [item["alarm"] for item in found[:3]] == [None, None, "warning"]
-
-
 def test_scans_that_are_no_recording_have_levels_and_no_alarm(
     run_derain, recording, tmp_path
 ) -> None:

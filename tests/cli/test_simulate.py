@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from recorded_scenes import write_scenes
 
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import read_labels
@@ -19,11 +20,7 @@ QUICK = ["--sensor", "mems_64", "--workers", "1", "--sequences", "3", "--scans",
 @pytest.fixture
 def clean(tmp_path) -> Path:
     """A folder of two clean scans of a room, 5,000 and 6,000 points."""
-    folder = tmp_path / "clean"
-    folder.mkdir()
-    for number in (5, 6):
-        scene(1000 * number, seed=number).tofile(folder / f"{number:06d}.bin")
-    return folder
+    return write_scenes(tmp_path / "clean", 5000, 6000)
 
 
 def names(folder: Path) -> list[str]:
@@ -80,7 +77,7 @@ def rained(folder: Path, stem: str, columns: int = 4) -> tuple[Float32s, NDArray
 def test_clean_scans_get_rain_and_labels_of_it(succeed, clean, tmp_path) -> None:
     out = tmp_path / "rainy"
     outcome = succeed("simulate", "--on", clean, "--rain", "50", "--out", out, "--json")
-    assert names(out) == ["000005.bin", "000005.label", "000006.bin", "000006.label"]
+    assert names(out) == ["000000.bin", "000000.label", "000001.bin", "000001.label"]
     for line, count in zip(outcome.out.splitlines(), (5000, 6000), strict=True):
         facts = json.loads(line)
         assert list(facts) == ["scan", "clean", "points", "rain", "lost"]
@@ -94,7 +91,7 @@ def test_clean_scans_get_rain_and_labels_of_it(succeed, clean, tmp_path) -> None
 def test_a_line_holds_what_the_rain_did_to_a_scan_and_a_bad_scan_is_reported(
     run_derain, clean, tmp_path
 ) -> None:
-    scan, bad = clean / "000005.bin", clean / "000004.bin"
+    scan, bad = clean / "000000.bin", clean / "cut.bin"
     bad.write_bytes(b"12345")
     outcome = run_derain("simulate", "--on", bad, scan, "--rain", "0", "--out", tmp_path / "rainy")
     assert outcome.code == 2

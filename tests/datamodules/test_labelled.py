@@ -111,22 +111,15 @@ def test_what_is_no_file_of_rain_rates_is_refused(tmp_path, text) -> None:
 
 
 def test_a_card_names_where_the_labels_of_sequences_and_of_scans_lie(tmp_path, write) -> None:
-    ours = tmp_path / "ours.yaml"
-    ours.write_text(
-        "name: ours\nclasses: {0: dry, 3: wet}\nrain: [3]\n"
-        "layout: {sequences: drives, scans: lidar, labels: truth}\nsplit: {test: [b]}\n"
-    )
-    root = tmp_path / "ours"
+    layout = Layout(sequences="drives", scans="lidar", labels="truth")
+    card = replace(load_card("kitti"), layout=layout, split={"test": ["b"]})
+    drives = tmp_path / "drives"
     for name in ("a", "b"):
-        write(root / f"drives/{name}/lidar/0.bin", root / f"drives/{name}/truth/0.label", [0, 3])
-    for paths, labels in (
-        ([root], ["b"]),
-        ([root / "drives"], ["a", "b"]),
-        ([root / "drives/a", root / "drives/b/lidar/0.bin"], ["a", "b"]),
-    ):
-        frames = labelled_scans(paths, load_card(ours), Loading()).frames("test")
-        expected = [root / f"drives/{name}/truth/0.label" for name in labels]
-        assert [frame.label_path for frame in frames] == expected
+        write(drives / name / "lidar/0.bin", drives / name / "truth/0.label")
+    for path, names in ((tmp_path, "b"), (drives, "ab")):
+        frames = labelled_scans([path], card, Loading()).frames("test")
+        labels = [drives / name / "truth/0.label" for name in names]
+        assert [frame.label_path for frame in frames] == labels
 
 
 def test_a_data_set_is_named_alone(simulated, tmp_path) -> None:

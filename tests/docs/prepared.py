@@ -1,15 +1,16 @@
 """The folder that the snippets of a page are run in: what they take for granted."""
 
 import shutil
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from recorded_scenes import write_wads
 
 from benchmarks.recorded_bags import Ros, drive, table_of, write_bag
 from derain.cards.card import load_card
 from derain.cli.main import main
-from derain.evaluation.hard_cases import scene
 from derain.files.labels import read_labels, write_labels
 from derain.scan import class_ids
 
@@ -70,7 +71,7 @@ def prepare(folder: Path, simulated: Path) -> None:
     shutil.copy(next(simulated.glob("bag/*.mcap")), folder / "drive.mcap")
     shutil.copy(KEPT / "outdet.onnx", folder / "model.onnx")
     shutil.copy(KEPT / "outdet.ckpt", folder / "model.ckpt")
-    _put_wads(folder / "WADS")
+    write_wads(folder / "WADS", *chain(*load_card("wads").split.values()))
     _put_troubles(folder)
 
 
@@ -116,15 +117,3 @@ def _put_troubles(folder: Path) -> None:
         shutil.copy(folder / "scans/000000.bin", folder / name)
     shutil.copy(folder / "scans/000000.label", folder / "recording/truth")
     (folder / "morning/positions.csv").write_text("x,y,z\n0,0,0\n")
-
-
-def _put_wads(root: Path) -> None:
-    """One made-up scan of 300 points for each sequence of the published split of WADS."""
-    drops = np.arange(300) >= 270
-    for sequences in load_card("wads").split.values():
-        for sequence in sequences:
-            folder = root / "sequences" / sequence
-            (folder / "velodyne").mkdir(parents=True)
-            (folder / "labels").mkdir()
-            scene(300, seed=int(sequence)).tofile(folder / "velodyne/000000.bin")
-            write_labels(folder / "labels/000000.label", np.where(drops, FALLING_SNOW, ROAD))

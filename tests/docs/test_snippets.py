@@ -15,8 +15,6 @@ import yaml
 
 import derain
 from derain.cli import main as command_line
-from derain.export.bench import bench
-from derain.export.bench.cost import measure_in_process
 
 from .pages import PAGES, REPOSITORY, Snippet, snippets
 from .prepared import prepare, put_networks, write_drive
@@ -57,13 +55,11 @@ def page_folder(
     monkeypatch.chdir(tmp_path)
     # The page of troubles shows what is printed where this runtime is missing.
     monkeypatch.setitem(sys.modules, "openvino", None)
-    # The timing has tests of its own.
-    monkeypatch.setattr(bench, "measure_cost", measure_in_process)
     with torch.random.fork_rng(devices=[]):
         yield tmp_path
 
 
-@pytest.mark.usefixtures("one_block", "short_proof")
+@pytest.mark.usefixtures("one_block", "short_proof", "in_this_process")
 @pytest.mark.parametrize("page", WITH_SNIPPETS, ids=name_of)
 def test_a_page_runs_from_its_first_snippet_to_its_last(page, page_folder) -> None:
     namespace: dict[str, Any] = {}

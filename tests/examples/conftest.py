@@ -3,9 +3,7 @@
 import shutil
 import sys
 from collections.abc import Iterator
-from copy import deepcopy
 from dataclasses import replace
-from functools import partial
 from importlib import import_module
 from itertools import product
 from pathlib import Path
@@ -14,7 +12,7 @@ from types import ModuleType, SimpleNamespace
 import onnx
 import pytest
 
-from derain.export.onnx_file import export, with_metadata
+from derain.export.onnx_file import with_metadata
 from derain.export.runtime import Derainer
 from derain.views.back_projection import BACK_PROJECTIONS
 from derain.views.candidates import Bound, Candidates
@@ -55,13 +53,9 @@ def derain_onnx(built) -> Program:
 
 
 @pytest.fixture(scope="session")
-def judging_candidates(random_outdet, candidates, made_once) -> Path:
+def judging_candidates(judging, candidates) -> Path:
     """3D-OutDet of random weights, exported with those candidates."""
-    model = deepcopy(random_outdet)
-    model.adopt(replace(model.spec, candidates=candidates))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("derain.models.outdet.network.BLOCKS", 1)  # traced several times as quickly
-        return made_once("examples_candidates.onnx", partial(export, model))
+    return judging("examples_candidates.onnx", candidates, 1)
 
 
 @pytest.fixture(params=product(BACK_PROJECTIONS, [None, (-60.0, 75.0)], [True, False]), ids=str)

@@ -8,12 +8,12 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from recorded_scenes import write_wads
 
 from derain.cli.main import main
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export.proof import THREADS
 from derain.export.runtime import Derainer
-from derain.files.labels import write_labels
 from derain.models.checkpoint import load_model
 from derain.models.registry import NETWORKS
 
@@ -35,14 +35,7 @@ def toy_network() -> Iterator[ModuleType]:
 @pytest.fixture(scope="module")
 def root(tmp_path_factory) -> Path:
     """Four made-up scans in the layout of WADS: two to train on, one to validate, one to test."""
-    root = tmp_path_factory.mktemp("WADS")
-    for number in range(4):
-        folder = root / "sequences" / f"0{number}"
-        (folder / "velodyne").mkdir(parents=True)
-        (folder / "labels").mkdir()
-        scene(300, seed=number).tofile(folder / "velodyne/0.bin")
-        write_labels(folder / "labels/0.label", np.where(DROPS, 110, 0))  # falling snow
-    return root
+    return write_wads(tmp_path_factory.mktemp("WADS"), "00", "01", "02", "03")
 
 
 @pytest.fixture(scope="module")

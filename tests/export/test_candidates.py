@@ -2,7 +2,6 @@
 
 from copy import deepcopy
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,6 @@ from derain.errors import InputError
 from derain.evaluation.counts import Counts
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export.candidates import fit_network_candidates
-from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.scan import Scan
 from derain.views.candidates import Bound, Candidates
@@ -25,13 +23,9 @@ WADS = load_card("wads")
 
 
 @pytest.fixture(scope="module")
-def judging_candidates(random_outdet, made_once) -> Path:
+def judging_candidates(judging) -> Path:
     """The same network as ``onnx_model``, exported with candidates."""
-    model = deepcopy(random_outdet)
-    model.adopt(replace(model.spec, candidates=NEAR_AND_DIM))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("derain.models.outdet.network.BLOCKS", 2)
-        return made_once("candidates.onnx", partial(export, model))
+    return judging("candidates.onnx", NEAR_AND_DIM, 2)
 
 
 def test_its_answer_for_candidates_is_bit_for_bit_that_of_the_model_without(

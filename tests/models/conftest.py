@@ -14,7 +14,7 @@ from derain.cards.card import load_card
 from derain.datamodules.base import Loading
 from derain.datamodules.folder import Folder
 from derain.datamodules.in_memory import InMemory
-from derain.learning.batch import Sample
+from derain.learning.batch import Batch, Sample
 from derain.models.base import DerainingModule
 from derain.models.outdet import OutDet
 from derain.scan import Scan
@@ -139,3 +139,18 @@ def trained_on_scenes(
     data = InMemory(train, validation, card="wads", loading=Loading(batch_size=2))
     trainer.fit(model, data)
     return model.eval()
+
+
+@pytest.fixture
+def judges_apart() -> Callable[..., None]:
+    """Asserts that a model judges scans in one batch as it judges each alone."""
+
+    def check(model: DerainingModule, *scans: Scan) -> None:
+        view = model.spec.make_view()
+        samples = [Sample(scan, view(scan), None) for scan in scans]
+        with torch.no_grad():
+            together = model.logits_of(Batch.of(samples))
+            alone = [model.logits_of(Batch.of([sample])) for sample in samples]
+        torch.testing.assert_close(together, torch.cat(alone))
+
+    return check

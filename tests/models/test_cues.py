@@ -124,15 +124,8 @@ def test_rows_in_another_order_are_judged_alike(packaged) -> None:
     np.testing.assert_allclose(shuffled, packaged.probability(scan)[order], atol=1e-4)
 
 
-def test_scans_of_a_batch_do_not_influence_each_other(trained) -> None:
-    view = trained.spec.make_view()
-    scans = [labelled(30), labelled(31, drops=30)]
-    samples = [
-        Sample.of(scan, view(scan), trained.card, key=str(n)) for n, scan in enumerate(scans)
-    ]
-    together = trained.logits_of(Batch.of(samples))
-    apart = torch.cat([trained.logits_of(Batch.of([sample])) for sample in samples])
-    torch.testing.assert_close(together, apart)
+def test_scans_of_a_batch_do_not_influence_each_other(trained, judges_apart) -> None:
+    judges_apart(trained, labelled(30), labelled(31, drops=30))
 
 
 def test_a_batch_without_a_point_to_learn_from_has_no_loss(trained) -> None:

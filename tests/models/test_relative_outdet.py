@@ -19,7 +19,6 @@ from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export import onnx_file
 from derain.export.candidates import fit_network_candidates
 from derain.export.runtime import Derainer
-from derain.learning.batch import Batch, Sample
 from derain.models.relative_outdet import RelativeOutDet, RelativeOutDetNetwork
 from derain.models.relative_outdet.network import in_steps
 from derain.models.supervised import FIRST_DIVISOR, one_cycle
@@ -141,14 +140,8 @@ def test_it_learns_drops_and_is_blind_to_intensity(trained, tmp_path, monkeypatc
     np.testing.assert_array_equal(derainer(bright), called)
 
 
-def test_scans_of_a_batch_do_not_influence_each_other(trained) -> None:
-    view = trained.spec.make_view(threads=1)
-    scans = [labelled(1), labelled(2, drops=5), Scan.of(scene(40))]
-    samples = [Sample(scan, view(scan), None) for scan in scans]
-    with torch.no_grad():
-        together = trained.logits_of(Batch.of(samples))
-        alone = [trained.logits_of(Batch.of([sample])) for sample in samples]
-    torch.testing.assert_close(together, torch.cat(alone))
+def test_scans_of_a_batch_do_not_influence_each_other(trained, judges_apart) -> None:
+    judges_apart(trained, labelled(1), labelled(2, drops=5), Scan.of(scene(40)))
 
 
 def test_it_takes_no_candidates(trained) -> None:

@@ -12,22 +12,6 @@ from derain.simulation.dataset import simulate_track
 from derain.simulation.layouts import LAYOUTS
 from derain.simulation.world import World, WorldCampaign, draw_scan, load_world, packaged_worlds
 
-# Quick to simulate: a bare street, seen by few beams.
-SMALL = """
-places: {street: 1}
-horizon: 0
-carrier: 0
-sensors: {kinds: {spinning: 1}, spinning_rows: [16], azimuth_step: [1.0, 1.5]}
-precipitation: {snow: {weight: 1, crowding: [0.1, 0.3]}}
-"""
-
-
-@pytest.fixture(scope="module")
-def small(open3d, tmp_path_factory) -> str:
-    path = tmp_path_factory.mktemp("world") / "small.yaml"
-    path.write_text(SMALL, "utf-8")
-    return str(path)
-
 
 @pytest.mark.parametrize("name", packaged_worlds())
 def test_a_packaged_world_draws_from_places_and_kinds_that_there_are(name) -> None:
@@ -36,25 +20,25 @@ def test_a_packaged_world_draws_from_places_and_kinds_that_there_are(name) -> No
     assert {name for name, _ in world.precipitation.kinds} >= {"none", "rain"}
 
 
-def test_a_scan_is_of_its_world(small) -> None:
-    scan, drawn = draw_scan(load_world(small), np.random.default_rng(5))
+def test_a_scan_is_of_its_world(small_world) -> None:
+    scan, drawn = draw_scan(load_world(small_world), np.random.default_rng(5))
     assert drawn["place"] == "street"
-    assert drawn["sensor"]["rows"] == 16
+    assert drawn["sensor"]["rows"] == 32
     assert drawn["precipitation"]["kind"] == "snow"
     assert set(np.unique(scan.label)) <= set(TrackClass)
     assert (scan.label == TrackClass.RAIN).any()
 
 
-def test_a_world_of_nothing_but_rain_is_refused(small, monkeypatch) -> None:
+def test_a_world_of_nothing_but_rain_is_refused(small_world, monkeypatch) -> None:
     monkeypatch.setattr("derain.simulation.world.LARGEST_SHARE_OF_RAIN", -1)
     monkeypatch.setattr("derain.simulation.world.MOST_TRIES", 2)
     with pytest.raises(InputError, match=r"world: .*rain"):
-        draw_scan(load_world(small), np.random.default_rng(5))
+        draw_scan(load_world(small_world), np.random.default_rng(5))
 
 
-def test_a_seed_gives_the_same_scans_however_many_there_are(small, tmp_path) -> None:
-    few = WorldCampaign(train=2, validation=0, seed=3, world=small)
-    more = WorldCampaign(train=2, validation=1, test=1, seed=3, world=small)
+def test_a_seed_gives_the_same_scans_however_many_there_are(small_world, tmp_path) -> None:
+    few = WorldCampaign(train=2, validation=0, seed=3, world=str(small_world))
+    more = WorldCampaign(train=2, validation=1, test=1, seed=3, world=str(small_world))
     simulate_track(tmp_path / "few", few)
     simulate_track(tmp_path / "more", more)
     for name in few.names:

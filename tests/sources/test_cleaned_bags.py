@@ -2,12 +2,13 @@
 
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import yaml
 from contents import contents
-from small_bags import bag_path, change_database, small_bag, storage_file, tables
+from small_bags import bag_path, change_database, change_metadata, small_bag, storage_file, tables
 
 import derain
 from benchmarks.recorded_bags import (
@@ -226,15 +227,17 @@ def test_compressed_bags_are_read_and_stay_compressed(
     assert storage_file(made).stat().st_size < 1.5 * storage_file(bag).stat().st_size
 
 
+def without_hashes(information: dict[str, Any]) -> None:
+    for topic in information["topics_with_message_count"]:
+        del topic["topic_metadata"]["type_description_hash"]
+
+
 def test_topics_without_definition_or_hash_are_copied(tmp_path, run_derain) -> None:
     """As ROS 2 before Iron records them, in a database without definitions."""
     bag = small_bag(tmp_path, "sqlite3")
     change_database(bag, "UPDATE topics SET type_description_hash = ''")
     change_database(bag, "DELETE FROM message_definitions")
-    metadata = yaml.safe_load((bag / "metadata.yaml").read_text("utf-8"))
-    for topic in metadata["rosbag2_bagfile_information"]["topics_with_message_count"]:
-        del topic["topic_metadata"]["type_description_hash"]
-    (bag / "metadata.yaml").write_text(yaml.safe_dump(metadata), "utf-8")
+    change_metadata(bag, without_hashes)
     assert run_derain(*RUN, bag, "--out", tmp_path / "out").code == 0
     made = tmp_path / "out" / "drive"
     assert connections_of(made) == connections_of(bag)

@@ -9,6 +9,7 @@ import pytest
 from contents import contents
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from recorded_scenes import write_drive
 from small_bags import small_bag
 from window_method import Between
 
@@ -37,16 +38,7 @@ clean = partial(derain.clean, most_removed=1)
 def drive(tmp_path) -> Path:
     """Two recordings with poses, in which scan 3 of the first cannot be read."""
     for place, name in enumerate(("first", "second")):
-        folder = tmp_path / "drives" / "sequences" / name / "velodyne"
-        folder.mkdir(parents=True)
-        poses = []
-        for number in range(SCANS):
-            points = scene(400, seed=7 * place)
-            points[:, 0] -= 0.3 * number
-            points[:40, :3] = np.random.default_rng(number).uniform(-6, 6, (40, 3))
-            points.tofile(folder / f"{number:06d}.bin")
-            poses.append(f"1 0 0 {0.3 * number} 0 1 0 0 0 0 1 0")
-        (folder / "poses.txt").write_text("\n".join(poses))
+        write_drive(tmp_path / "drives/sequences" / name / "velodyne", SCANS, 400, seed=7 * place)
     (tmp_path / "drives/sequences/first/velodyne/000003.bin").write_bytes(b"broken")
     return tmp_path / "drives"
 
@@ -205,11 +197,3 @@ def test_a_changed_scan_is_done_again_with_the_blocks_that_see_it(drive, tmp_pat
     assert len(first.scans) == len(again.scans) == 2 * SCANS - 1
     # Blocks 0-1 and 2-3 of the second recording: the first of them sees scan 2 as well.
     assert again.before == len(again.scans) - 4
-
-
-def test_methods_that_find_poses_see_whole_recordings(drive) -> None:
-    for poses in drive.rglob("poses.txt"):
-        poses.unlink()
-    source = derain.named_frames(drive)
-    for method in (derain.PersistenceDerainer(), RecordedDerainer(derain.Derainer())):
-        assert [len(unit.frames) for unit in units_of(source, method, 2)] == [SCANS, SCANS]

@@ -129,18 +129,6 @@ def test_hard_scans_are_viewed(name, scan) -> None:
     assert seen.counts.sum() == len(seen.points)
 
 
-def test_scans_of_a_batch_stay_apart() -> None:
-    seen = [VIEW(wall_and_drops(seed, drops)) for seed, drops in ((0, 200), (1, 50))]
-    packed = IsolatedPoints.pack(seen)
-    begin = len(seen[0].points)
-    np.testing.assert_array_equal(
-        packed["points"][packed["neighbours"][seen[0].size :]], seen[1].points[seen[1].neighbours]
-    )
-    assert packed["neighbours"][: seen[0].size].max() < begin
-    assert packed["counts"].shape == (2, SHELLS, INTENSITY_RANKS)
-    assert packed["step"].shape == (2,)
-
-
 def test_crowding_is_what_is_near_along_the_curve_and_near_the_least_crowded_there() -> None:
     xyz = scene(300)[:, :3].astype(np.float32)
     step = 0.01

@@ -12,7 +12,7 @@ from derain.views.candidates import Bound, Candidates
 from derain.views.channels import filled_values
 from derain.views.morton import distinct_positions, distinct_rows, first_rows, morton_code
 from derain.views.neighbour_search import NeighbourSearch
-from derain.views.neighbours import Neighbourhoods, NeighbourView
+from derain.views.neighbours import NeighbourView
 
 # Few values on a coarse grid: many duplicates and many equal distances.
 gridded = hnp.arrays(
@@ -170,22 +170,6 @@ def test_candidates_get_their_own_score_and_all_else_gets_none() -> None:
     expected = whole.back(np.where(among, score, np.float32(0)))
     np.testing.assert_array_equal(part.back(score[among]), expected)
     np.testing.assert_array_equal(part.judged, whole.judged)
-
-
-@pytest.mark.parametrize("candidates", [None, NEAR_AND_LOW], ids=["all", "candidates"])
-def test_packing_keeps_every_scan_to_itself(candidates) -> None:
-    view = NeighbourView(4, candidates=candidates)
-    views = [view(Scan.of(scene(n + 10, n)[:n])) for n in (100, 0, 3, 70)]
-    packed = Neighbourhoods.pack(views)
-    begin = dict.fromkeys(packed, 0)
-    for one in views:
-        inputs = one.inputs()
-        shift = {"neighbours": begin["points"], "candidates": begin["neighbours"]}
-        for name, array in inputs.items():
-            rows = packed[name][begin[name] :][: len(array)]
-            np.testing.assert_array_equal(rows, array + shift.get(name, 0))
-        begin = {name: begin[name] + len(array) for name, array in inputs.items()}
-    assert {name: len(array) for name, array in packed.items()} == begin
 
 
 def test_a_real_scan_agrees_with_scikit_learn(shared) -> None:

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases
 from derain.files import read_scan
 from derain.files.labels import label_beside, read_labels
@@ -16,7 +15,7 @@ from derain.scan import Bools, Ints, Scan, class_ids
 from derain.views.back_projection import BACK_PROJECTIONS, REACH, ProjectedPoints
 from derain.views.candidates import Bound, Candidates
 from derain.views.grid_fit import fit_grid
-from derain.views.range_image import RangeImage, RangeView
+from derain.views.range_image import RangeView
 from derain.views.spherical_grid import SphericalGrid, grid_of
 from derain.views.view import IGNORED
 
@@ -99,13 +98,6 @@ def test_the_target_ignores_empty_pixels_and_takes_the_truth_of_what_is_shown() 
     assert target.dtype == np.int64
 
 
-def test_hidden_are_the_points_behind_a_nearer_one_and_not_its_copies() -> None:
-    scan = Scan.of([[3, 0, 0, 1], [9, 0, 0, 1], [3, 0, 0, 1], [0, 0, 0, 1], [0, 0, 9, 1]])
-    image = RangeView(FULL)(scan)
-    assert image.hidden.tolist() == [False, True, False, False, False]
-    assert image.pixel[3:].tolist() == [-1, -1]
-
-
 BOUNDS = st.builds(
     Candidates,
     st.tuples(
@@ -155,23 +147,6 @@ def pixels_around(grid: SphericalGrid, pixel: int) -> list[int]:
     if not grid.is_full_circle:
         columns = [number for number in columns if 0 <= number < grid.columns]
     return [above * grid.columns + beside % grid.columns for above in rows for beside in columns]
-
-
-def test_packing_keeps_every_scan_to_its_own_image() -> None:
-    rng = np.random.default_rng(2)
-    views = [RangeView(FRONT)(Scan.of(rng.normal(size=(n, 4)))) for n in (10, 0, 300)]
-    packed = RangeImage.pack(views)
-    assert packed["image"].shape == (3, 5, 6, 12)
-    assert packed["valid"].shape == (3, 1, 6, 12)
-    for number, view in enumerate(views):
-        for name, array in view.inputs().items():
-            assert packed[name].dtype == array.dtype
-            np.testing.assert_array_equal(packed[name][number : number + 1], array)
-
-
-def test_an_unknown_back_projection_is_refused() -> None:
-    with pytest.raises(InputError, match="no such back-projection: 'knn'"):
-        RangeView(FULL, back_projection="knn")
 
 
 @pytest.mark.parametrize("case", HARD_CASES)

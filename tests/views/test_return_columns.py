@@ -38,16 +38,19 @@ def of_old_las_bits(recording: Recording) -> dict[str, Array]:
     return {"bit_fields": numbers(recording) | counts << 3 | 0b01000000}
 
 
+def of_kinds(recording: Recording, *kinds: int) -> dict[str, Array]:
+    """One of the first two for the first return, of the next two for the second, or the only."""
+    first, second = (np.where(recording.ray % 2, *two) for two in (kinds[:2], kinds[2:4]))
+    kind = np.where(numbers(recording) == 2, second, first)
+    return {"return_type": np.where(recording.two, kind, kinds[4]).astype(np.uint8)}
+
+
 def of_nebula(recording: Recording) -> dict[str, Array]:
-    first = np.where(recording.ray % 2, 4, 9)
-    kind = np.where(numbers(recording) == 2, np.where(recording.ray % 2, 10, 5), first)
-    return {"return_type": np.where(recording.two, kind, 6).astype(np.uint8)}
+    return of_kinds(recording, 4, 9, 10, 5, 6)
 
 
 def of_autoware(recording: Recording) -> dict[str, Array]:
-    first = np.where(recording.ray % 2, 3, 5)
-    kind = np.where(numbers(recording) == 2, np.where(recording.ray % 2, 6, 4), first)
-    return {"return_type": np.where(recording.two, kind, 7).astype(np.uint8)}
+    return of_kinds(recording, 3, 5, 6, 4, 7)
 
 
 def of_livox(recording: Recording) -> dict[str, Array]:

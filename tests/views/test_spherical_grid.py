@@ -1,6 +1,5 @@
 """The grid's pixels against the published formula, at every border, and in every notation."""
 
-import json
 import math
 
 import numpy as np
@@ -110,12 +109,6 @@ def test_every_beam_has_its_own_row() -> None:
 
 def test_beams_at_the_poles_stay_below_them() -> None:
     assert SphericalGrid.of_beams([90, 70, -80], 4).edges == (90.0, 80.0, -5.0, -90.0)
-
-
-@given(grids())
-def test_a_grid_comes_back_from_json_bit_for_bit(grid) -> None:
-    content = json.loads(json.dumps(grid.as_dict()))
-    assert grid_of(content, "model.onnx") == grid
 
 
 @pytest.mark.parametrize(

@@ -5,10 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from recorded_scenes import write_wads
 
 from derain.errors import InputError
-from derain.evaluation.hard_cases import scene
-from derain.files.labels import write_labels
 from derain.models.checkpoint import load_model
 from derain.workflows.fit import FitResults, fit, fit_options
 
@@ -25,13 +24,8 @@ def test_settings_are_options_of_the_command() -> None:
 @pytest.fixture
 def settings(tmp_path, one_block) -> dict[str, object]:
     """Settings for one epoch of a data set in the layout of WADS, of two sequences."""
-    for sequence in ("00", "01"):
-        folder = tmp_path / "WADS/sequences" / sequence
-        (folder / "velodyne").mkdir(parents=True)
-        scene(300).tofile(folder / "velodyne/0.bin")
-        write_labels(folder / "labels/0.label", np.where(np.arange(300) < 270, 0, 110))
     return {
-        "data.root": tmp_path / "WADS",
+        "data.root": write_wads(tmp_path / "WADS", "00", "01"),
         "data.split": {"train": ["00"], "validation": ["01"], "test": []},
         "data.loading.workers": 0,
         "trainer.max_epochs": 1,

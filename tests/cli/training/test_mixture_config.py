@@ -1,9 +1,11 @@
 """The packaged mixture trains and predicts, on two small made-up data sets."""
 
 import json
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
+from recorded_scenes import write_wads
 
 from derain.cards.card import load_card
 from derain.models.checkpoint import load_model
@@ -16,10 +18,8 @@ QUICK = [
 
 
 def test_the_packaged_mixture_goes_from_training_to_predictions(succeed, write_labelled) -> None:
-    snow, streets = Path("WADS/sequences"), Path("streets/sequences")
-    for sequence in (name for names in load_card("wads").split.values() for name in names):
-        folder = snow / sequence
-        write_labelled(folder / "velodyne/0.bin", folder / "labels/0.label", rain=110)
+    streets = Path("streets/sequences")
+    write_wads(Path("WADS"), *chain(*load_card("wads").split.values()))
     for sequence in ("000", "001", "002"):
         folder = streets / sequence
         scan, label = folder / "lidar_radar_pcd/0.bin", folder / "lidar_radar_labels/0.label"

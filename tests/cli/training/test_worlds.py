@@ -12,7 +12,7 @@ from derain.workflows.configurations import packaged_configs
 def test_worlds_are_made_and_trained_on(succeed, small_world) -> None:
     config = yaml.safe_load(packaged_configs()["cues_worlds.yaml"].read_text("utf-8"))
     for part in config["data"]["init_args"]["parts"].values():
-        part["init_args"]["campaign"] |= {"world": small_world.name, "train": 2, "validation": 1}
+        part["init_args"]["campaign"] |= {"world": str(small_world), "train": 2, "validation": 1}
         part["init_args"]["workers"] = 1
     Path("worlds.yaml").write_text(yaml.safe_dump(config), "utf-8")
     options = [

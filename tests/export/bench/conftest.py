@@ -1,12 +1,10 @@
-"""Labelled scans that the tests of the bench share, and a bench in this process."""
+"""Labelled scans that the tests of the bench share."""
 
 import numpy as np
 import pytest
 
 from derain.cards.card import DataCard
 from derain.evaluation.hard_cases import scene
-from derain.export.bench import bench
-from derain.export.bench.cost import measure_in_process
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.files.labels import write_labels
 from derain.sources.folders import named_frames
@@ -29,9 +27,3 @@ def labelled(tmp_path) -> LabelledFrames:
     folders = sorted(tmp_path.glob("sequence */scans"))
     rates = {"sequence 0": 10.0, "sequence 1": 25.0, "sequence 2": 10.0}
     return LabelledFrames(FrameReader(CARD), named_frames(folders, labelled=True), rain_rates=rates)
-
-
-@pytest.fixture
-def in_this_process(monkeypatch) -> None:
-    """Times methods in this process; that each has its own is tested by itself."""
-    monkeypatch.setattr(bench, "measure_cost", measure_in_process)
