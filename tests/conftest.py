@@ -193,21 +193,11 @@ def checkpoint(random_outdet, made_once) -> Path:
 
 
 @pytest.fixture(scope="session")
-def onnx_model(random_outdet, made_once) -> Path:
-    """The same network, exported; in two blocks, which are traced several times as quickly."""
+def judging(random_outdet, made_once) -> "Callable[[str, Candidates | None, int], Path]":
+    """Exports the same network under a name, with candidates and in so many blocks."""
     from derain.export.onnx_file import export
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("derain.models.outdet.network.BLOCKS", 2)
-        return made_once("outdet.onnx", partial(export, random_outdet))
-
-
-@pytest.fixture(scope="session")
-def judging(random_outdet, made_once) -> "Callable[[str, Candidates, int], Path]":
-    """Exports the same network under a name, in so many blocks, with candidates."""
-    from derain.export.onnx_file import export
-
-    def exported(name: str, candidates: "Candidates", blocks: int) -> Path:
+    def exported(name: str, candidates: "Candidates | None", blocks: int) -> Path:
         model = deepcopy(random_outdet)
         model.adopt(replace(model.spec, candidates=candidates))
         with pytest.MonkeyPatch.context() as patch:
@@ -215,6 +205,12 @@ def judging(random_outdet, made_once) -> "Callable[[str, Candidates, int], Path]
             return made_once(name, partial(export, model))
 
     return exported
+
+
+@pytest.fixture(scope="session")
+def onnx_model(judging) -> Path:
+    """The same network, exported; in two blocks, which are traced several times as quickly."""
+    return judging("outdet.onnx", None, 2)
 
 
 @pytest.fixture(scope="session")
