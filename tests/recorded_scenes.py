@@ -34,7 +34,6 @@ def write_wads(root: Path, *sequences: str) -> Path:
     for place, sequence in enumerate(sequences):
         scans, labels = (root / "sequences" / sequence / name for name in ("velodyne", "labels"))
         scans.mkdir(parents=True)
-        labels.mkdir()
         scene(300, seed=place).tofile(scans / "0.bin")
         write_labels(labels / "0.label", np.where(np.arange(300) >= 270, 110, 0))
     return root

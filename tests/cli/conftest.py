@@ -20,11 +20,9 @@ def write_labelled() -> WriteScan:
     """Writes a scan of 300 points and its labels: the drops are ``rain``, all else is class 0."""
 
     def write(scan: Path, label: Path, rain: int) -> None:
-        points = scene(300, seed=sum(scan.name.encode()))
         scan.parent.mkdir(parents=True, exist_ok=True)
-        points.tofile(scan)
-        drops = np.arange(300) >= 270
-        write_labels(label, np.where(drops, rain, 0))
+        scene(300, seed=sum(scan.name.encode())).tofile(scan)
+        write_labels(label, np.repeat([0, rain], [270, 30]))
 
     return write
 

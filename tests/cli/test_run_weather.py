@@ -152,8 +152,7 @@ def test_scans_that_are_no_recording_have_levels_and_no_alarm(
 ) -> None:
     for number, name in enumerate(("street", "bridge", "000900", "field", "park", "000100")):
         (recording / f"{number:06d}.bin").rename(recording / f"{name}.bin")
-    out = tmp_path / "out"
-    arguments = ("run", "dror", recording, "--out", out, "--json", *LEVELS)
+    arguments = ("run", "dror", recording, "--out", tmp_path / "out", "--json", *LEVELS)
     outcome = run_derain(*arguments, "--fail-at", "warning")
     found = objects(outcome.out)
     by_name = ["clear", "warning", "clear", "warning", "clear", "clear"]

@@ -24,8 +24,7 @@ def recording(tmp_path) -> Path:
         points = scene(300, seed=number)
         points[number] = np.nan
         points.tofile(folder / f"{number:03}.bin")
-        label = tmp_path / f"drive/labels/{number:03}.label"
-        write_labels(label, np.repeat([0, 110], [270, 30]))
+        write_labels(tmp_path / f"drive/labels/{number:03}.label", np.repeat([0, 110], [270, 30]))
     return folder
 
 

@@ -80,6 +80,14 @@ def test_ror_counts_the_points_within_its_radius(cloud, neighbours, radius) -> N
     np.testing.assert_array_equal(FilterDerainer(ROR(neighbours, radius))(scan), expected)
 
 
+def test_a_point_at_exactly_the_radius_is_within() -> None:
+    line = np.column_stack([np.arange(1, 9), np.zeros((8, 3))]).astype(np.float32)
+    ror, expected = ROR(3, 1.0), [True] + [False] * 6 + [True]
+    assert FilterDerainer(ror)(line).tolist() == expected
+    view = filter_view(3, threads=1)(Scan.of(line))  # as it shares it with other filters
+    assert ror.judge(view)[view.inverse].tolist() == expected
+
+
 @settings(max_examples=80)
 @given(
     cloud=clouds,

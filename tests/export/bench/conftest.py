@@ -20,9 +20,7 @@ def labelled(tmp_path) -> LabelledFrames:
         path = tmp_path / f"sequence {number}/scans/{number}.bin"
         path.parent.mkdir(parents=True)
         scene(300, seed=number).tofile(path)
-        label = np.where(np.arange(300) >= 270, 3, 0)
-        if number == 0:
-            label[:20] = 9
+        label = np.repeat([9 if number == 0 else 0, 0, 3], [20, 250, 30])
         write_labels(path.with_suffix(".label"), label)
     folders = sorted(tmp_path.glob("sequence */scans"))
     rates = {"sequence 0": 10.0, "sequence 1": 25.0, "sequence 2": 10.0}
