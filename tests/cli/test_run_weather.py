@@ -152,8 +152,8 @@ def test_scans_that_are_no_recording_have_levels_and_no_alarm(
 ) -> None:
     for number, name in enumerate(("street", "bridge", "000900", "field", "park", "000100")):
         (recording / f"{number:06d}.bin").rename(recording / f"{name}.bin")
-    arguments = ("run", "dror", recording, "--out", tmp_path / "out", "--json", *LEVELS)
-    outcome = run_derain(*arguments, "--fail-at", "warning")
+    options = ("--out", tmp_path / "out", "--json", *LEVELS, "--fail-at", "warning")
+    outcome = run_derain("run", "dror", recording, *options)
     found = objects(outcome.out)
     by_name = ["clear", "warning", "clear", "warning", "clear", "clear"]
     assert [item["level"] for item in found] == by_name

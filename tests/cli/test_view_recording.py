@@ -33,8 +33,7 @@ def test_what_is_kept_and_removed_is_what_run_finds(
 ) -> None:
     out = tmp_path / "out.rrd"
     methods = {"net": str(onnx_model), "dror": "dror", "persistence": "persistence"}
-    given = [f"{title}={name}" for title, name in methods.items()]
-    poses = ["--poses", "standing"]
+    given, poses = [f"{title}={name}" for title, name in methods.items()], ["--poses", "standing"]
     outcome = succeed("view", recording, "--methods", *given, *poses, "--rerun", out)
     first, last = outcome.out.splitlines()
     assert "4 scans" in first
@@ -71,8 +70,7 @@ def test_truth_colours_what_methods_do(succeed, recording, tmp_path) -> None:
     write_labels(recording.parent / "labels/001.label", np.full(300, 9))
     (recording.parent / "labels/002.label").unlink()
     out = tmp_path / "out.rrd"
-    options = ["--card", card, "--methods", "dror", "--frames", "0:3"]
-    succeed("view", recording, *options, "--rerun", out)
+    succeed("view", recording, "--card", card, "--methods=dror", "--frames", "0:3", "--rerun", out)
     found = ReadBack(out)
     scan = read_scan(recording / "000.bin")
     labelled = np.flatnonzero(scan.valid & (labels != 0))
@@ -109,10 +107,8 @@ def test_without_labels_there_is_no_truth(succeed, recording, tmp_path) -> None:
         label.unlink()
     out = tmp_path / "out.rrd"
     options = ["--card", "wads", "--methods", "dror", "--rerun", out]
-    outcome = succeed("view", recording, *options)
-    first = recording / "000.bin"
-    (warning,) = outcome.messages
-    assert f"{first}: no scan has labels" in warning
+    (warning,) = succeed("view", recording, *options).messages
+    assert f"{recording / '000.bin'}: no scan has labels" in warning
     assert not any("truth" in entity for entity in ReadBack(out).entities)
 
 

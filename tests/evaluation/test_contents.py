@@ -56,16 +56,14 @@ def test_the_manifest_states_rain_rates_before_the_weather_does(tmp_path) -> Non
     record(tmp_path / "sequences/002", "temperature\n9\n")
     manifest = {"made_by": MAKER, "rain_rate_mm_h": {"000": 10.0}}
     (tmp_path / "manifest.json").write_text(json.dumps(manifest))
-    rates = [rate for _, rate in find_sequences(tmp_path, REHEARSE3D)]
-    assert rates == [10, 11, None]
+    assert [rate for _, rate in find_sequences(tmp_path, REHEARSE3D)] == [10, 11, None]
 
 
 def test_a_rain_gauge_that_fails_is_not_heeded_and_a_damaged_record_is_named(tmp_path) -> None:
     for name, rates in {"000": "nan\n9\ninf", "001": "nan"}.items():
         add_scan(tmp_path / name, REHEARSE3D, "000000", [0])
         record(tmp_path / name, f"rain_rate_mm_h\n{rates}\n")
-    rates = [rate for _, rate in find_sequences(tmp_path, REHEARSE3D)]
-    assert rates == [9, None]
+    assert [rate for _, rate in find_sequences(tmp_path, REHEARSE3D)] == [9, None]
     record(tmp_path / "000", "rain_rate_mm_h\nwet\n")
     with pytest.raises(InputError, match=r"000000\.csv: cannot be read"):
         find_sequences(tmp_path, REHEARSE3D)

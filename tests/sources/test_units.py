@@ -197,3 +197,11 @@ def test_a_changed_scan_is_done_again_with_the_blocks_that_see_it(drive, tmp_pat
     assert len(first.scans) == len(again.scans) == 2 * SCANS - 1
     # Blocks 0-1 and 2-3 of the second recording: the first of them sees scan 2 as well.
     assert again.before == len(again.scans) - 4
+
+
+def test_methods_that_find_poses_see_whole_recordings(drive) -> None:
+    for poses in drive.rglob("poses.txt"):
+        poses.unlink()
+    for method in (derain.PersistenceDerainer(), RecordedDerainer(derain.Derainer())):
+        units = units_of(derain.named_frames(drive), method, 2)
+        assert [len(unit.frames) for unit in units] == [SCANS, SCANS]
