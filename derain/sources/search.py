@@ -12,6 +12,7 @@ from derain.cards.known import known_layouts
 from derain.cards.layout import Layout
 from derain.errors import InputError
 from derain.files import RECORDS, find_scans
+from derain.files.atomic import writing
 from derain.files.format import FORMATS
 from derain.files.names import scan_suffix
 from derain.files.reading import reading
@@ -174,8 +175,13 @@ class _Search:
 
 
 def mark_as_results(folder: Path) -> None:
-    """Has a later search pass over a folder of results, by an empty folder of records."""
-    (folder / JOB_RECORDS).mkdir(exist_ok=True)
+    """Has a later search pass over a folder of results, by an empty folder of records.
+
+    Raises:
+        InputError: It cannot be made, for instance because the disk is full.
+    """
+    with writing(folder):
+        (folder / JOB_RECORDS).mkdir(exist_ok=True)
 
 
 def _is_of_job(folder: str) -> bool:
