@@ -143,7 +143,7 @@ class CloudTopic:
         if self._times is None:
             times: list[tuple[int, int]] = []
             messages = self.bag.messages(self.topic)
-            try:
+            try:  # extend keeps the clouds before the damage
                 times.extend((each.time, self._taken(each)) for each in messages)
             except InputError as error:
                 self._end = error
