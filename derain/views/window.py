@@ -29,7 +29,11 @@ class Window:
 
     def __post_init__(self) -> None:
         for name in ("before", "after"):  # whatever a user gave
-            Entry("window", name, getattr(self, name)).whole(0, MOST_SCANS)
+            value = getattr(self, name)
+            if isinstance(value, np.integer):
+                value = int(value)
+                object.__setattr__(self, name, value)
+            Entry("window", name, value).whole(0, MOST_SCANS)
 
     @property
     def is_one_scan(self) -> bool:

@@ -64,6 +64,10 @@ def test_a_window_has_a_number_of_scans_that_memory_holds(side, wrong) -> None:
         Window(**{side: wrong})
 
 
+def test_a_window_of_a_number_of_numpy_is_the_same_as_one_of_a_number() -> None:
+    assert repr(Window(np.int64(1), np.uint8(2))) == repr(Window(1, 2))
+
+
 @pytest.fixture
 def registered() -> Iterator[type[View]]:
     """A view of another package, known to derain for one test."""
