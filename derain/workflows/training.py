@@ -59,6 +59,7 @@ from derain.workflows.start import START_HELP, checkpoint_of
 from derain.workflows.training_errors import (
     as_input_error,
     known_options,
+    raised_by_lightning,
     refusals_in_a_line,
 )
 
@@ -278,10 +279,14 @@ class WholeConfig(SaveConfigCallback):
         logger = trainer.logger
         if trainer.global_step or not isinstance(logger, TensorBoardLogger):
             return
-        if trainer.is_global_zero and isinstance(exception, InputError):
+        refused = isinstance(exception, InputError) or (
+            isinstance(exception, Exception) and raised_by_lightning(exception)
+        )
+        if trainer.is_global_zero and refused:
             folder = Path(logger.log_dir)
             names = sorted(path.name.split(".")[0] for path in folder.glob("*"))
-            if names == ["config", "events"]:  # and nothing of an earlier run
+            # The arguments come last, and there is nothing of an earlier run.
+            if names in (["config", "events"], ["config", "events", "hparams"]):
                 shutil.rmtree(folder)
 
 

@@ -118,12 +118,12 @@ def refusals_in_a_line() -> Iterator[None]:
                 f"cannot be written ({error.strerror})",
                 "Choose a folder that is writable and has room: --trainer.logger.save_dir.",
             ) from error
-        if _raised_by_lightning(error):
+        if raised_by_lightning(error):
             raise InputError("--trainer", str(error).rstrip(".!"), HINT) from error
         raise
 
 
-def _raised_by_lightning(error: Exception) -> bool:
+def raised_by_lightning(error: Exception) -> bool:
     """True if Lightning itself refuses something, such as an option; its messages name it."""
     *_, (frame, _) = traceback.walk_tb(error.__traceback__)
     module: str = frame.f_globals.get("__name__", "")

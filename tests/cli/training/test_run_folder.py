@@ -33,3 +33,9 @@ def test_a_training_that_its_data_refuse_leaves_no_folder(last_line) -> None:
     Path("absent").mkdir()
     assert "absent" in last_line("fit", "--config", "outdet_wads.yaml", "--data.root", "absent")
     assert not list(Path("runs/outdet_wads").iterdir())
+
+
+def test_a_training_that_lightning_refuses_leaves_no_folder(last_line, wads) -> None:
+    line = last_line("fit", *wads, *SHORT, "--trainer.val_check_interval", "100")
+    assert "val_check_interval" in line
+    assert not list(Path("runs/outdet_wads").iterdir())
