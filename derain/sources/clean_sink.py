@@ -170,9 +170,11 @@ class CleanSink:
         return f"{' and '.join(counts)} are written, each of them whole"
 
     def _is_among_scans(self, folder: Path) -> bool:
-        """True if a folder lies in the one that holds all scans."""
+        """True if a folder without scans of its own lies in the one that holds all scans."""
         scans = [frame.path.absolute() for frame in self._source if isinstance(frame, FileFrame)]
-        return bool(scans) and folder.absolute().is_relative_to(os.path.commonpath(scans))
+        if not scans or any(scan.is_relative_to(folder.absolute()) for scan in scans):
+            return False
+        return folder.absolute().is_relative_to(os.path.commonpath(scans))
 
     def _is_in_bag(self, frame: Frame) -> bool:
         return frame in self._stored_bags or self._bags.takes(frame)

@@ -67,3 +67,12 @@ def test_results_among_the_recordings_are_none_to_a_later_run(tmp_path, keeps) -
     assert len(report.scans) == 4
     later = [frame.name for frame in derain.named_frames(drives)]
     assert later == [frame.name for frame in source]
+
+
+def test_a_folder_of_scans_is_not_marked_as_one_of_results(tmp_path) -> None:
+    for name in "ab":
+        write_scenes(tmp_path / name, 200)
+    source = derain.named_frames(tmp_path)
+    with derain.CleanSink(tmp_path / "a", source) as sink:
+        derain.clean(source, derain.FilterDerainer(derain.DROR()), sink, most_removed=1)
+    assert not (tmp_path / "a/.derain").exists()
