@@ -279,9 +279,7 @@ class WholeConfig(SaveConfigCallback):
         logger = trainer.logger
         if trainer.global_step or not isinstance(logger, TensorBoardLogger):
             return
-        refused = isinstance(exception, InputError) or (
-            isinstance(exception, Exception) and raised_by_lightning(exception)
-        )
+        refused = isinstance(exception, InputError) or raised_by_lightning(exception)
         if trainer.is_global_zero and refused:
             folder = Path(logger.log_dir)
             names = sorted(path.name.split(".")[0] for path in folder.glob("*"))

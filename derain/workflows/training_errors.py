@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 
 from jsonargparse import ArgumentParser
+from lightning.fabric.utilities.exceptions import MisconfigurationException
 
 from derain.errors import InputError
 from derain.models.former_names import FORMER_OPTIONS
@@ -102,6 +103,10 @@ def _unusable(subject: str, message: str) -> InputError:
     return InputError(subject, f"cannot be {value['value']}", f"Give: {' or '.join(kinds)}.")
 
 
+# What Lightning refuses options and data by. Its other errors are faults, and keep their traceback.
+REFUSALS = (MisconfigurationException, ValueError, TypeError, RuntimeError)
+
+
 @contextmanager
 def refusals_in_a_line() -> Iterator[None]:
     """Turns what Lightning or the system refuses, before a training or in it, into one line.
@@ -111,7 +116,7 @@ def refusals_in_a_line() -> Iterator[None]:
     """
     try:
         yield
-    except Exception as error:
+    except (*REFUSALS, OSError) as error:
         if isinstance(error, OSError) and error.errno is not None:  # Lightning raises others
             raise InputError(
                 error.filename or "the run's folder",
@@ -123,8 +128,10 @@ def refusals_in_a_line() -> Iterator[None]:
         raise
 
 
-def raised_by_lightning(error: Exception) -> bool:
+def raised_by_lightning(error: BaseException) -> bool:
     """True if Lightning itself refuses something, such as an option; its messages name it."""
+    if not isinstance(error, REFUSALS):
+        return False
     *_, (frame, _) = traceback.walk_tb(error.__traceback__)
     module: str = frame.f_globals.get("__name__", "")
     return module.startswith("lightning.")

@@ -4,6 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from derain.errors import InputError
+from derain.workflows.training_errors import refusals_in_a_line
+
 SIMULATED = "data: {class_path: derain.datamodules.simulated.Simulated, init_args: %s}"
 FIT = ("fit", "--config", "outdet_simulated.yaml")
 
@@ -81,3 +84,11 @@ def test_the_remedy_for_labels_names_an_option_of_training(last_line, labels, op
     line = last_line("fit", "--model", "OutDet", *data, *parts)
     assert option in line
     assert f" --{option.rpartition('.')[2]}" not in line
+
+
+@pytest.mark.parametrize(
+    ("error", "raised"), [(ValueError("no"), InputError), (KeyError("fault"), KeyError)]
+)
+def test_what_lightning_refuses_is_a_line_and_its_faults_are_not(error, raised) -> None:
+    with pytest.raises(raised), refusals_in_a_line():
+        exec("raise error", {"__name__": "lightning.trainer", "error": error})
