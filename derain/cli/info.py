@@ -1,18 +1,16 @@
 """Describes scans, label files, bags, exported models, checkpoints and data sets.
 
-For a scan it also prints the grid of the range image that fits, and the number of rays with two
-returns; with --card, how often the second return of a labelled scan is the surface behind rain. For
-a data set (a folder of sequences as of REHEARSE-3D, SemanticKITTI or WADS, or simulated; one
-sequence; or a folder of scans) it counts scans and points by class and rain rate. With --grid it
-fits one grid to all scans, for a configuration. `derain info default` prints the card of the model
-that comes with derain: what it is, how good it is, and when not to use it. Processes (--workers), a
-Dask cluster (--dask) or shards (--shard) count many scans. With --out derain keeps records: a count
-that was stopped resumes, and `derain status` prints its progress.
+For a scan it also prints the grid of the range image that fits. For a data set (a folder of
+sequences as of REHEARSE-3D, SemanticKITTI or WADS, or simulated; one sequence; or a folder of
+scans) it counts scans and points by class and rain rate. With --grid it fits one grid to all scans,
+for a configuration. `derain info default` prints the card of the model that comes with derain: what
+it is, how good it is, and when not to use it. Processes (--workers), a Dask cluster (--dask) or
+shards (--shard) count many scans. With --out derain keeps records: a count that was stopped
+resumes, and `derain status` prints its progress.
 
   derain info default
   derain info scan.bin
   derain info scan.bin --columns x,y,z,intensity,ring --json
-  derain info velodyne/042228.bin --card wads
   derain info labels/000000.label
   derain info model.onnx
   derain info --grid scans
@@ -69,8 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--card",
-        help="data card with the classes and folders of a data set (default: found by its "
-        "folders), or with the rain classes of a labelled scan",
+        help="data card with the classes and folders of a data set (default: found by its folders)",
     )
     parser.add_argument(
         "--layout",
@@ -145,7 +142,7 @@ def _describe(name: str, arguments: argparse.Namespace) -> None:
     if os.path.isdir(path) and not is_bag(path):
         _describe_folder(path, arguments)
         return
-    facts = facts_of_file(path, arguments.card, arguments.columns)
+    facts = facts_of_file(path, arguments.columns)
     if arguments.json:
         print(json.dumps({"file": str(path), **facts}))
     else:

@@ -12,30 +12,24 @@ from derain.bags.cloud_topic import CloudTopic
 from derain.bags.names import is_bag, split
 from derain.bags.point_cloud import DATATYPES
 from derain.bags.topics import POINT_CLOUD, Topic, decoder_of
-from derain.cards.card import DataCard, load_card
-from derain.cards.known import layouts_for
 from derain.errors import InputError
-from derain.evaluation.ray_counts import RayCounts
 from derain.files.labels import read_labels
 from derain.files.reading import reading
 from derain.scan import Array, Scan, class_ids
 from derain.sources.folders import frame_of
-from derain.sources.frame import Frame
 from derain.system.extras import CHECKPOINT_LIBRARIES, require
 from derain.system.notices import warn
 from derain.views.directions import directions
 from derain.views.grid_fit import fit_grid
 from derain.views.morton import distinct_positions
-from derain.views.returns import pair_returns
 from derain.views.scan_issues import no_points
 
 
-def facts_of_file(path: Path, card_name: str | None, columns: Sequence[str]) -> dict[str, Any]:
+def facts_of_file(path: Path, columns: Sequence[str]) -> dict[str, Any]:
     """The facts about a file, by its suffix.
 
     Args:
         path: The file.
-        card_name: Data card of a scan's labels; None where there is none.
         columns: Names of the columns of files that do not name them.
 
     Raises:
@@ -65,12 +59,10 @@ def facts_of_file(path: Path, card_name: str | None, columns: Sequence[str]) -> 
             remedy = "Make a checkpoint of them with `derain import-weights`."
             raise InputError(path, "holds weights without the Spec of their use", remedy)
         case _:
-            card = None if card_name is None else load_card(card_name)
-            frame = frame_of(path, columns, layouts_for(card))
-            scan = frame.read()
+            scan = frame_of(path, columns).read()
             for issue in no_points(scan):
                 warn(f"{path}: {issue.detail}")
-            return _of_scan(scan, frame, card)
+            return _of_scan(scan)
 
 
 def _of_labels(path: Path) -> dict[str, Any]:
@@ -82,8 +74,8 @@ def _of_labels(path: Path) -> dict[str, Any]:
     return {"points": labels, "points by class id": by_class}
 
 
-def _of_scan(scan: Scan, frame: Frame, card: DataCard | None) -> dict[str, Any]:
-    """A scan's extent, the grid that fits, and its returns."""
+def _of_scan(scan: Scan) -> dict[str, Any]:
+    """A scan's extent and the grid that fits."""
     valid = scan.valid
     points = scan.xyz[valid]
     azimuth, inclination = directions(points)
@@ -101,7 +93,6 @@ def _of_scan(scan: Scan, frame: Frame, card: DataCard | None) -> dict[str, Any]:
         "inclination / deg": _span(inclination),
         "intensity": "none" if scan.intensity is None else _span(scan.intensity[valid]),
         "fitted grid": "none",
-        "returns": _returns(scan, frame, card),
     }
     if valid.any():
         fit = fit_grid([scan]).as_dict()
@@ -117,30 +108,6 @@ def _span(values: Array) -> dict[str, float] | str:
         return "none"
     numbers = np.percentile(values, [0, 50, 100]).tolist()
     return {name: round(n, 4) for name, n in zip(("min", "median", "max"), numbers, strict=True)}
-
-
-def _returns(scan: Scan, frame: Frame, card: DataCard | None) -> dict[str, Any] | str:
-    """Number of rays with two returns, and the classes behind rain if labels are known."""
-    returns = pair_returns(scan)
-    if not returns.dual:
-        return "one of each ray"
-    rain = None
-    if card is not None and frame.has_labels:
-        rain = card.rain_of(scan.with_label(frame.read_label(len(scan))))
-    counts = RayCounts.of(scan, returns, rain)
-    facts = {
-        "found by": returns.found_by,
-        "rays": counts.rays,
-        "with two returns": counts.dual,
-        "share": round(counts.dual_share, 4),
-    }
-    if rain is not None:
-        facts |= {
-            "that met rain first": counts.met_rain,
-            "with something else behind": counts.given_back,
-            "share given back": round(counts.given_back_share, 4),
-        }
-    return facts
 
 
 def _of_bag(path: Path) -> dict[str, Any]:

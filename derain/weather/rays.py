@@ -1,8 +1,7 @@
 """The end of each ray of a scan, and whether it is rain.
 
 Returns in one direction are of one ray: the copies of a return that dual-return sensors write, and
-what stands behind a drop. They are found by direction alone, in a small part of the time of
-:func:`derain.views.returns.pair_returns`, which also finds which return is which.
+what stands behind a drop.
 """
 
 import numpy as np

@@ -11,14 +11,11 @@ import yaml
 
 from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
-from derain.files import read_scan, write_scan
+from derain.files import read_scan
 from derain.files.labels import write_labels
 from derain.models.checkpoint import save_model
-from derain.scan import Scan
 from derain.views.grid_fit import fit_grid
 from derain.views.spherical_grid import grid_of
-
-from ..two_returns import Recording
 
 
 @pytest.fixture
@@ -68,7 +65,6 @@ def test_a_scan_is_described_by_its_valid_points(facts_of, scan) -> None:
         "azimuth / deg": {"min": 0.0, "median": 90.0, "max": 180.0},
         "inclination / deg": {"min": 0.0, "median": 0.0, "max": 53.1301},
         "intensity": {"min": 0.0, "median": 15.0, "max": 30.0},
-        "returns": "one of each ray",
     }
 
 
@@ -116,33 +112,6 @@ def test_a_file_that_cannot_be_read_keeps_no_other_from_being_described(
         "none.bin",
         str(tmp_path / "cut.bin"),
     ]
-
-
-def test_rays_of_two_returns_are_counted_and_by_labels_what_lies_behind_rain(
-    facts_of, tmp_path
-) -> None:
-    recording = Recording(0)
-    _, nearer, _ = recording.truth()
-    snow = nearer & (recording.ray % 2 == 0)
-    write_scan(tmp_path / "dual.npz", Scan.of(recording.xyz))
-    write_labels(tmp_path / "dual.label", np.where(snow, 110, 0))
-    rays, dual, met = len(np.unique(recording.ray)), int(nearer.sum()), int(snow.sum())
-    counted = {
-        "found by": "directions",
-        "rays": rays,
-        "with two returns": dual,
-        "share": round(dual / rays, 4),
-    }
-    by_labels = {
-        "that met rain first": met,
-        "with something else behind": met,
-        "share given back": 1,
-    }
-    arguments = [tmp_path / "dual.npz", "--card", "wads"]
-    assert facts_of(tmp_path / "dual.npz")["returns"] == counted
-    assert facts_of(*arguments)["returns"] == {**counted, **by_labels}
-    (tmp_path / "dual.label").unlink()
-    assert facts_of(*arguments)["returns"] == counted
 
 
 def test_a_scan_without_a_valid_point_has_no_grid(facts_of, refused, tmp_path) -> None:

@@ -1,4 +1,4 @@
-"""Counts of points and rays against scikit-learn and by hand, and the tables that they fill.
+"""Counts of points against scikit-learn and by hand, and the tables that they fill.
 
 That two processes count what one counts is proved by `tests/models/test_processes.py`.
 """
@@ -18,12 +18,8 @@ from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.counts import SCORES, ClassCounts, Counts, RainCounts, mean_over_scans
 from derain.evaluation.metrics import RainMetrics
-from derain.evaluation.ray_counts import RayCounts
 from derain.evaluation.text_tables import markdown_table, number_text, plain_table
 from derain.scan import Bools, Scan
-from derain.views.returns import pair_returns
-
-from ..two_returns import Recording
 
 CLASSES = {0: "ground", 3: "rain", 7: "car", 110: "snow", 255: "nobody knows"}
 RAIN = (3, 110)
@@ -145,38 +141,6 @@ def test_a_metric_counts_alike_in_any_precision_and_forgets_when_reset() -> None
     metric.reset()
     assert metric.counts().per_scan == []
     assert metric.counts().pooled == Counts()
-
-
-@pytest.mark.parametrize("seed", range(2))
-@pytest.mark.parametrize("times", [1, 2])
-def test_each_ray_counts_once_however_often_it_is_written(seed, times) -> None:
-    recording = Recording(seed)
-    rain = np.random.default_rng(seed).random(len(recording.ray)) < 0.3
-    scan = Scan.of(np.tile(recording.xyz, (times, 1)))
-    dual, met, given_back = 0, 0, 0
-    rays = np.unique(recording.ray)
-    for ray in rays:
-        rows = np.flatnonzero(recording.ray == ray)
-        rows = rows[np.argsort(recording.distance[rows])]
-        dual += len(rows) == 2
-        met += rain[rows[0]]
-        given_back += len(rows) == 2 and rain[rows[0]] and not rain[rows[1]]
-    counts = RayCounts.of(scan, pair_returns(scan), np.tile(rain, times))
-    assert counts == RayCounts(len(rays), dual, met, given_back)
-    assert (counts.dual_share, counts.given_back_share) == (dual / len(rays), given_back / met)
-    assert RayCounts.of(scan, pair_returns(scan)) == RayCounts(len(rays), dual, 0, 0)
-
-
-def test_a_return_whose_ray_met_something_that_is_no_row_has_met_no_rain() -> None:
-    recording = Recording(0)
-    _, nearer, farther = recording.truth()
-    returns = {
-        "return_number": np.where(farther, 2, 1).astype(np.uint8),
-        "number_of_returns": np.where(recording.two, 2, 1).astype(np.uint8),
-    }
-    scan = Scan(recording.xyz, fields=returns).take(~nearer)
-    counts = RayCounts.of(scan, pair_returns(scan), np.ones(len(scan), bool))
-    assert counts == RayCounts(len(scan), int(farther.sum()), len(scan) - int(farther.sum()), 0)
 
 
 def test_tables_line_up_and_a_number_that_is_undefined_is_a_dash() -> None:
