@@ -77,14 +77,9 @@ class Augmentation:
     def changes_anything(self) -> bool:
         """True if any scan is changed."""
         of_points = self.jitter_probability, self.dropping_probability, self.sector_probability
+        of_scans = self.rotation_probability, self.mirror_probability
         other = self.brightness_probability, self.user_probability
-        return max(*of_points, *other) > 0 or self.moves_the_sensor
-
-    @property
-    def moves_the_sensor(self) -> bool:
-        """True if it turns or mirrors whole scans, each in its own way."""
-        moving = self.rotation_probability, self.mirror_probability, self.user_probability
-        return max(moving) > 0
+        return max(*of_points, *of_scans, *other) > 0
 
     def __call__(
         self,

@@ -54,16 +54,9 @@ def scan_loader(
         draws: The scans that an epoch of training draws; None draws each once.
 
     Raises:
-        InputError: Labels missing where they are needed; or a network that sees several scans,
-            with an augmentation that moves one of them alone.
+        InputError: Labels missing where they are needed.
     """
     view = task.spec.make_view(threads=1 if loading.workers else 0)
-    if part == "train" and loading.augmentation.moves_the_sensor and not view.window.is_one_scan:
-        raise InputError(
-            "augmentation",
-            "would turn a scan but not the scans around it, which the network also sees",
-            "Set rotation_probability, mirror_probability and user_probability to 0.",
-        )
     reader = loading.reader(task.card, task.columns)
     augmented = part == "train" and loading.augmentation.changes_anything
     # Tests and predictions read each scan once.

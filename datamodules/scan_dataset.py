@@ -16,11 +16,9 @@ from derain.learning.seeds import Draw, generator_of
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
-from derain.sources.recordings import recordings_of
 from derain.sources.spread import evenly_spaced
 from derain.system.stopwatch import Stopwatch
-from derain.views.view import View, ViewedScan
-from derain.views.window import PlacedScan, WindowOfScans
+from derain.views.view import View
 
 Item = TypeVar("Item", Scan, Sample)
 
@@ -87,7 +85,7 @@ class ScanDataset(Dataset[Sample | InputError]):
 
         with stopwatch.stage(VIEW):
             if self.augmentation is None:
-                made = self._kept.get(number, lambda: self._viewed(read(), number, stopwatch))
+                made = self._kept.get(number, lambda: self._viewed(read(), number))
             else:
                 scan = self._kept.get(number, read)
                 # A scan that is drawn once is augmented the same, whether or not others repeat.
@@ -95,17 +93,12 @@ class ScanDataset(Dataset[Sample | InputError]):
                 generator = generator_of(Draw.AUGMENTATION, self.seed, pick.epoch, *drawn)
                 card = self.reader.card
                 scan = self.augmentation(scan, generator, self.view.azimuth, card.rain)
-                made = self._viewed(scan, number, stopwatch)
+                made = self._viewed(scan, number)
         # A kept sample took next to no time in this epoch.
         return replace(made, measured=pick.measured, milliseconds=stopwatch.milliseconds)
 
-    def _viewed(self, scan: Scan, number: int, stopwatch: Stopwatch) -> Sample:
-        def read_around(frame: Frame) -> Scan:
-            with stopwatch.stage(READ):
-                return self.reader.read_unlabelled(frame)
-
-        view = view_in_window(self.view, scan, self.frames, number, read_around)
-        return Sample.of(scan, view, self.reader.card, key=self.frames[number].key)
+    def _viewed(self, scan: Scan, number: int) -> Sample:
+        return Sample.of(scan, self.view(scan), self.reader.card, key=self.frames[number].key)
 
 
 class Cache:
@@ -146,43 +139,3 @@ def bytes_of(item: object) -> int:
         case _ if hasattr(item, "__dict__") and not callable(item):
             return bytes_of(vars(item))
     return 0
-
-
-def view_in_window(
-    view: View,
-    scan: Scan,
-    frames: Sequence[Frame],
-    number: int,
-    read: Callable[[Frame], Scan],
-) -> ViewedScan:
-    """A network's view of a scan, with the scans around it if the view needs them.
-
-    Args:
-        view: The view.
-        scan: The scan to be judged, as read and perhaps augmented.
-        frames: All frames, in time order, one sequence after the other.
-        number: Number of the scan's frame.
-        read: Reads the scans around it.
-
-    Raises:
-        InputError: A scan around it, or its time or pose, that cannot be read.
-    """
-    window = view.window
-    if window.is_one_scan:
-        return view(scan)
-
-    def placed(frame: Frame, its_scan: Scan) -> PlacedScan:
-        return PlacedScan(its_scan, frame.time, frame.pose)
-
-    # The window ends at gaps in a sequence.
-    first = max(number - window.before, 0)
-    before = recordings_of(frames[first : number + 1])[-1][:-1]
-    after = recordings_of(frames[number : number + window.after + 1])[0][1:]
-    judged = placed(frames[number], scan)
-    return view.of_window(
-        WindowOfScans(
-            judged,
-            [placed(frame, read(frame)) for frame in before],
-            [placed(frame, read(frame)) for frame in after],
-        )
-    )

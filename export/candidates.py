@@ -65,7 +65,7 @@ def fit_network_candidates(
 
     Raises:
         InputError: Scans without rain, or in which it finds none, or none that bounds separate
-            from the rest; a model that sees several scans at a time, or takes no candidates.
+            from the rest; a model that takes no candidates.
     """
     _require_candidates(model)
     with evaluation_on_cpu(model):
@@ -100,18 +100,13 @@ def fit_network_candidates(
 
 def _require_candidates(model: DerainingModule) -> None:
     """Refuses a model that cannot be given candidates, before any scan is judged."""
-
-    def refusal(reason: str) -> InputError:
-        return InputError("--candidates", reason, "Leave the option out.")
-
     view = model.spec.make_view()
-    if not view.window.is_one_scan:
-        raise refusal("the network sees several scans at a time")
     seen = view.with_candidates(Candidates((Bound("range", most=1.0),)))(Scan.of(np.zeros((0, 4))))
     try:
         signature(model.forward).bind(**seen.inputs())
     except TypeError as error:
-        raise refusal(f"{model.NAME} judges every point alike ({error})") from error
+        reason = f"{model.NAME} judges every point alike ({error})"
+        raise InputError("--candidates", reason, "Leave the option out.") from error
 
 
 def _judged(model: DerainingModule, scan: Scan, card: DataCard) -> tuple[Scan, Bools, Bools]:

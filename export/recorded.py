@@ -67,13 +67,10 @@ class RecordedDerainer(PlacedMethod):
         delay: Scans after it, which it has to wait for.
 
     Raises:
-        InputError: Other numbers of scans than 0 to 50, or a model that sees several scans itself.
+        InputError: Other numbers of scans than 0 to 50.
     """
 
     def __init__(self, model: Derainer, past: int = 1, delay: int = 0) -> None:
-        if not model.window.is_one_scan:
-            reason = "its view already sees several scans"
-            raise InputError(model.name, reason, "Use the model itself.")
         self.model = model
         self.warns = model.warns
         self._window = Window(past, delay)

@@ -1,7 +1,7 @@
 """Runs an exported model on a CPU: NumPy, one runtime and the kNN library, nothing else."""
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
@@ -20,22 +20,19 @@ from derain.export.runtimes.session import (
     TensorType,
 )
 from derain.scan import Array, Bools, Float32s, Scan
-from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
-from derain.sources.method import Method
-from derain.sources.recent_frames import FrameInWindow, RecentFrames
+from derain.sources.scan_method import ScanMethod
 from derain.system.cores import threads_of
 from derain.system.stopwatch import Stopwatch
 from derain.views.probability import probability_of_rain
 from derain.views.scan_issues import ScanIssue, intensity_in_places, outside_view
 from derain.views.view import View, ViewedScan
-from derain.views.window import PlacedScan, Window
 from derain.weather.scan_weather import ScanWeather
 
 __all__ = ["METADATA_KEY", "Derainer", "Judgement"]
 
 
-class Derainer(Method):
+class Derainer(ScanMethod):
     """An exported model, ready to judge scans.
 
     Example:
@@ -88,7 +85,6 @@ class Derainer(Method):
         self.view = self.spec.make_view(self.threads)
         self.session = self.runtime.open(file, self.threads)
         _refuse_other_network(self.session, self.view, self.path)
-        self._recent = RecentFrames(self.view.window)
 
     def __call__(self, points: Scan | Array, stopwatch: Stopwatch | None = None) -> Bools:
         """Returns which points are rain.
@@ -137,12 +133,12 @@ class Derainer(Method):
     def judge_silently(self, points: Scan | Array, stopwatch: Stopwatch | None = None) -> Judgement:
         """As :meth:`judge`, without warnings."""
         scan, stopwatch = Scan.of(points), stopwatch or Stopwatch()
-        judgement = self._judged(scan, lambda: self.view(scan), stopwatch)
+        judgement = self._judged(scan, stopwatch)
         dark = scan.lacks_intensity
         if not (self.view.WEIGHS_INTENSITY and dark.any()):
             return judgement
         blank = replace(scan, intensity=None)
-        of_blank = self._judged(blank, lambda: self.view(blank), stopwatch)
+        of_blank = self._judged(blank, stopwatch)
         probability = np.where(dark, of_blank.probability, judgement.probability)
         rain = np.where(dark, of_blank.rain, judgement.rain)
         return Judgement(probability, rain, judgement.judged | dark, scan)
@@ -166,86 +162,10 @@ class Derainer(Method):
         """
         return self.judge(points).weather
 
-    @property
-    def window(self) -> Window:
-        """Number of scans that its view needs before and after the one that it judges."""
-        return self.view.window
-
-    def depends_on(self, recording: Sequence[Frame]) -> Window:
-        """The scans that its view needs before and after the one that it judges."""
-        return self.window
-
     def fingerprint(self) -> str:
         """A fingerprint of its file as it was read, its threshold and its runtime."""
         settings = f"{self.spec.threshold} {self.runtime.name} {self.runtime.precision}"
         return sha256(f"{self._checksum} {settings}".encode()).hexdigest()[:16]
-
-    @property
-    def waiting(self) -> int:
-        """Number of frames that were pushed and not answered: they wait for frames after them."""
-        return self._recent.waiting
-
-    def starts_new_recording(self, frame: Frame) -> bool:
-        """True if pushing a frame would let go of those that wait: it does not follow them."""
-        return self._recent.waiting > 0 and self._recent.starts_new_recording(frame)
-
-    def push(
-        self, frame: Frame | Scan | Array, stopwatch: Stopwatch | None = None
-    ) -> Judgement | None:
-        """Takes the next frame of a recording.
-
-        Example:
-            >>> derainer = Derainer("model.onnx")
-            >>> points = np.fromfile("scan.bin", np.float32).reshape(-1, 4)
-            >>> judgement = derainer.push(points)  # and so on, with every scan that comes in
-            >>> len(judgement.rain), derainer.waiting
-            (820, 0)
-
-        A model whose view needs scans after the one that it judges answers for an earlier frame,
-        as many frames back. One of another sequence, or after a gap, starts a new recording: call
-        :meth:`flush` before it, or the frames that still wait are let go of.
-
-        Args:
-            frame: A frame, which is read; or points, as for calling the model, of which each push
-                is taken for the next of one sequence.
-            stopwatch: Takes the times of the stages read, view, network and back.
-
-        Returns:
-            The judgement of the frame that has all of its window by now; None until there is one.
-
-        Raises:
-            InputError: A frame that cannot be read, a network that fails, or whose scores are not
-                finite.
-        """
-        stopwatch = stopwatch or Stopwatch()
-        if isinstance(frame, Frame):
-            with stopwatch.stage("read"):
-                scan = frame.read()
-        else:
-            scan = Scan.of(frame)
-        if self._recent.window.is_one_scan:
-            judgement = self.judge(scan, stopwatch)
-            return replace(judgement, frame=frame) if isinstance(frame, Frame) else judgement
-        if not isinstance(frame, Frame):
-            frame = self._recent.frame_of(scan)
-        ready = self._recent.push(frame, PlacedScan(scan, frame.time, frame.pose))
-        return None if ready is None else self._judged_in_window(ready, stopwatch)
-
-    def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
-        """Ends a recording: answers for the frames that still wait, with the scans that there are.
-
-        What is pushed afterwards is of another recording. Where one of those that wait cannot be
-        judged, those after it go on waiting.
-
-        Args:
-            stopwatch: Takes the times of the stages view, network and back.
-
-        Raises:
-            InputError: A network that fails, or whose scores are not finite.
-        """
-        while self._recent.waiting:
-            yield self._judged_in_window(self._recent.pop(), stopwatch or Stopwatch())
-        self._recent = RecentFrames(self.view.window)
 
     def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
         """Warnings about a scan for the model, and whether much of it lies outside its grid."""
@@ -259,8 +179,7 @@ class Derainer(Method):
         return {"method": self.name, "threshold": self.spec.threshold}
 
     def __reduce__(self) -> tuple[type[Self], tuple[Any, ...], dict[str, Any]]:
-        # A runtime's session cannot be pickled: a copy, as in another process, reads the file anew
-        # and begins a recording of its own.
+        # A runtime's session cannot be pickled: a copy, as in another process, reads the file anew.
         options = (self.name, self.threads, self.runtime.name, self.runtime.precision)
         return type(self), options, {"spec": self.spec, "warns": self.warns}
 
@@ -277,16 +196,9 @@ class Derainer(Method):
                 self.path, f"its network fails ({error})", "Export it with `derain export`."
             ) from error
 
-    def _judged_in_window(self, ready: FrameInWindow, stopwatch: Stopwatch) -> Judgement:
-        scans = ready.scans
-        with ready.naming_errors():
-            judgement = self._judged(scans.scan, lambda: self.view.of_window(scans), stopwatch)
-        return self.with_warnings(replace(judgement, frame=ready.frame))
-
-    def _judged(self, scan: Scan, see: Callable[[], ViewedScan], stopwatch: Stopwatch) -> Judgement:
-        """Judges a scan by what ``see`` gives."""
+    def _judged(self, scan: Scan, stopwatch: Stopwatch) -> Judgement:
         with stopwatch.stage("view"):
-            view = see()
+            view = self.view(scan)
         with stopwatch.stage("network"):
             logits = self.logits(view)
             self._check_scores(logits, view, scan)

@@ -62,7 +62,7 @@ class Between(RecordingMethod):
         assert isinstance(frame, Frame)
         assert not frame.has_labels
         with (stopwatch or Stopwatch()).stage("read"):
-            placed = PlacedScan(frame.read(), frame.time, frame.pose)
+            placed = PlacedScan(frame.read(), frame.pose)
             ready = self._recent.push(frame, placed)
         return None if ready is None else self._judged(ready)
 

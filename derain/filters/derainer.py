@@ -1,7 +1,6 @@
 """A filter, ready to judge scans as an exported model does."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -9,22 +8,20 @@ import numpy as np
 from derain.errors import InputError
 from derain.filters.point_filter import PointFilter, rows_of
 from derain.scan import Array, Bools, Scan
-from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
-from derain.sources.method import Method
+from derain.sources.scan_method import ScanMethod
 from derain.system.cores import threads_of
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
 from derain.views.one_viewpoint import viewpoint_issues
 from derain.views.scan_issues import ScanIssue, intensity_in_places
-from derain.views.window import Window
 from derain.weather.scan_weather import ScanWeather
 
 # What bounds are called among the parameters of a filter; they are the same for every one.
 CANDIDATES = "candidates"
 
 
-class FilterDerainer(Method):
+class FilterDerainer(ScanMethod):
     """A filter, called as :class:`derain.export.runtime.Derainer` is.
 
     Example:
@@ -94,27 +91,6 @@ class FilterDerainer(Method):
     def gives_probabilities(self) -> bool:
         """No: a filter returns which points are rain, and no more."""
         return False
-
-    def depends_on(self, recording: Sequence[Frame]) -> Window:
-        """No scans but the one that it judges."""
-        return self.window
-
-    def push(self, frame: Frame | Scan | Array, stopwatch: Stopwatch | None = None) -> Judgement:
-        """Judges the next frame of a recording, at once.
-
-        Args:
-            frame: A frame, which is read; or points, as for calling the filter.
-            stopwatch: Takes the times of the stages read, view, network and back.
-
-        Raises:
-            InputError: A frame that cannot be read.
-        """
-        stopwatch = stopwatch or Stopwatch()
-        if not isinstance(frame, Frame):
-            return self.judge(frame, stopwatch)
-        with stopwatch.stage("read"):
-            scan = frame.read()
-        return replace(self.judge(scan, stopwatch), frame=frame)
 
     def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
         """Warnings about a scan for the filter, or for any method that uses places."""

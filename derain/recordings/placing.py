@@ -83,7 +83,7 @@ class PlacedFrames(RecentFrames):
             self._stretch += not registration.trusted
             pose = registration.pose
         self.doubts[scan] = doubts
-        return PlacedScan(scan, None, pose, self._stretch)
+        return PlacedScan(scan, pose, self._stretch)
 
 
 class PlacedMethod(Method):

@@ -11,7 +11,6 @@ from derain.system.registry import Registry
 from derain.views.candidates import Candidates
 from derain.views.channels import Channels, FillValues
 from derain.views.spherical_grid import ALL_AROUND, Extent
-from derain.views.window import Window, WindowOfScans
 
 # In a target: nothing is there to be judged, such as in a pixel without a return.
 IGNORED = -1
@@ -124,11 +123,6 @@ class View(ABC):
         """
         return ALL_AROUND
 
-    @property
-    def window(self) -> Window:
-        """The scans that it sees: by default the one that is judged, alone."""
-        return Window()
-
     def with_candidates(self, candidates: Candidates) -> "View":
         """The same view with cells for candidates alone; all other points are given score 0.
 
@@ -146,15 +140,7 @@ class View(ABC):
 
     @abstractmethod
     def __call__(self, scan: Scan) -> ViewedScan:
-        """Views a scan, alone."""
-
-    def of_window(self, scans: WindowOfScans) -> ViewedScan:
-        """Views a scan among those around it, at most as many as :attr:`window`.
-
-        Args:
-            scans: The scan, with others of its sequence. What is seen has its rows, not theirs.
-        """
-        return self(scans.scan)
+        """Views a scan."""
 
 
 # Every view, by the name that it has in a Spec.

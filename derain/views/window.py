@@ -1,4 +1,4 @@
-"""A window: which scans of a sequence a view sees besides the one that is judged."""
+"""A window: which scans of a sequence a method sees besides the one that is judged."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ MOST_SCANS = 50
 
 @dataclass(frozen=True)
 class Window:
-    """Number of scans before and after one that a view needs; none by default.
+    """Number of scans before and after one that a method needs; none by default.
 
     Attributes:
         before: Scans before it in its sequence.
@@ -37,24 +37,22 @@ class Window:
 
     @property
     def is_one_scan(self) -> bool:
-        """True if the view needs only the scan that is judged."""
+        """True if the method needs only the scan that is judged."""
         return not (self.before or self.after)
 
 
 @dataclass(frozen=True, eq=False)
 class PlacedScan:
-    """A scan of a sequence, and when and where the sensor took it.
+    """A scan of a sequence, and where the sensor took it.
 
     Attributes:
         scan: The scan, in the frame of its sensor.
-        time: Seconds; None where it is not known.
         pose: Takes the sensor's frame to that of the world, float64 (4, 4), metres; None where it
             is not known.
         stretch: Scans of one number have poses in one world, with none in doubt between them.
     """
 
     scan: Scan
-    time: float | None = None
     pose: Floats | None = None
     stretch: int = 0
 
@@ -69,7 +67,7 @@ class PlacedScan:
 class WindowOfScans:
     """A scan that is to be judged, and those around it in its sequence.
 
-    Near the ends of a sequence there are fewer than in the view's :class:`Window`.
+    Near the ends of a sequence there are fewer than in the method's :class:`Window`.
 
     Attributes:
         judged: The scan that is to be judged.

@@ -7,7 +7,6 @@ is what that model answered for ``scene(300)``. None of the three is ever to be 
 """
 
 import pickle
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,12 +24,8 @@ from derain.models.base import DerainingModule
 from derain.models.checkpoint import load_model
 from derain.scan import Float32s, Scan
 from derain.sources.frame import MemoryFrame
-from derain.sources.judgement import Judgement
-from derain.sources.source import Frames
 from derain.system.stopwatch import Stopwatch
-from derain.views.neighbours import NeighbourView
 from derain.views.probability import probability_of_rain
-from derain.views.window import Window, WindowOfScans
 
 KEPT = Path(__file__).parent / "kept"
 POINTS = 200
@@ -172,72 +167,3 @@ def test_a_frame_is_answered_at_once_as_if_it_were_judged_alone(derainer) -> Non
         assert of_points.frame is None
         np.testing.assert_array_equal(of_points.probability, judgement.probability)
     assert list(derainer.flush()) == []
-
-
-def as_seen(scan: Scan, before: int, after: int) -> Scan:
-    """A scan as the view of the tests below shows it: what is around it shows in intensity."""
-    seen = np.full(len(scan), 20 * before + 60 * after, np.float32)
-    seen[0] += 1  # measured, as it seems
-    return replace(scan, intensity=seen)
-
-
-@pytest.fixture
-def windowed(onnx_model, monkeypatch) -> Iterator[Derainer]:
-    """A model whose view asks for two scans before and one after."""
-
-    def of_window(view: NeighbourView, scans: WindowOfScans) -> object:
-        return view(as_seen(scans.scan, len(scans.before), len(scans.after)))
-
-    monkeypatch.setattr(NeighbourView, "window", Window(before=2, after=1))
-    monkeypatch.setattr(NeighbourView, "of_window", of_window)
-    return Derainer(onnx_model, 1)
-
-
-def assert_seen(judgement: Judgement | None, derainer: Derainer, before: int, after: int) -> None:
-    expected = derainer.probability(as_seen(judgement.scan, before, after))
-    np.testing.assert_array_equal(judgement.probability, expected)
-    other = derainer.probability(as_seen(judgement.scan, before + 1, after))
-    assert (judgement.probability != other).any()
-
-
-def test_a_window_is_answered_when_it_is_whole_and_at_the_end(windowed) -> None:
-    frames = [*Frames.of_scans([Scan.of(scene(POINTS, seed)) for seed in range(4)])]
-    answers = [windowed.push(frame) for frame in frames]
-    assert [answer and answer.frame for answer in answers] == [None, *frames[:3]]
-    assert windowed.waiting == 1
-    for before, answer in enumerate(answers[1:]):
-        assert_seen(answer, windowed, before, after=1)
-    (last,) = windowed.flush()
-    assert last.frame is frames[3]
-    assert_seen(last, windowed, before=2, after=0)
-    assert windowed.waiting == 0
-
-
-def test_points_without_a_frame_are_one_sequence_until_its_end(windowed) -> None:
-    assert windowed.push(scene(POINTS, 0)) is None
-    assert_seen(windowed.push(Scan.of(scene(POINTS, 1))), windowed, before=0, after=1)
-    (frame,) = Frames.of_scans([Scan.of(scene(POINTS))], "another")
-    assert windowed.starts_new_recording(frame)
-    assert len(list(windowed.flush())) == 1
-    assert not windowed.starts_new_recording(frame)  # nothing would be lost
-    for pushed in (frame, scene(POINTS, 2)):  # each of a recording of its own
-        assert windowed.push(pushed) is None
-        (answer,) = windowed.flush()
-        assert_seen(answer, windowed, before=0, after=0)
-
-
-def test_one_of_those_that_wait_does_not_take_the_others_with_it(windowed, monkeypatch) -> None:
-    monkeypatch.setattr(NeighbourView, "window", Window(before=0, after=3))
-    derainer = Derainer(windowed.path, 1)
-    for seed in range(3):
-        assert derainer.push(Scan.of(scene(POINTS, seed))) is None
-
-    def failing(_: object) -> object:
-        raise MemoryError
-
-    with monkeypatch.context() as patch:
-        patch.setattr(derainer.session, "run", failing)
-        with pytest.raises(InputError, match="its network fails"):
-            list(derainer.flush())
-    assert derainer.waiting == 2
-    assert len(list(derainer.flush())) == 2

@@ -23,11 +23,11 @@ def frames(*lengths: int) -> list[MemoryFrame]:
 
 
 def seen(given: FrameInWindow) -> tuple[list[float | None], ...]:
-    """Times of the frames before, of the frame, and of those after."""
+    """Times, held in `stretch`, of the frames before, of the frame, and of those after."""
     scans = given.scans
-    assert scans.judged.time == given.frame.time
+    assert scans.judged.stretch == given.frame.time
     parts = (scans.before, [scans.judged], scans.after)
-    return tuple([placed.time for placed in part] for part in parts)
+    return tuple([placed.stretch for placed in part] for part in parts)
 
 
 @given(
@@ -41,7 +41,7 @@ def test_windows_are_those_of_the_whole_recording(lengths, before, after) -> Non
     for frame in frames(*lengths):
         if recent.starts_new_recording(frame):
             found += [recent.pop() for _ in range(recent.waiting)]
-        given_back = recent.push(frame, PlacedScan(SCAN, frame.time))
+        given_back = recent.push(frame, PlacedScan(SCAN, stretch=frame.time))
         found += [given_back] if given_back else []
         assert recent.waiting <= after
     found += [recent.pop() for _ in range(recent.waiting)]
@@ -60,7 +60,7 @@ def test_windows_are_those_of_the_whole_recording(lengths, before, after) -> Non
 def test_nothing_is_kept_that_no_window_asks_for() -> None:
     recent = RecentFrames(Window(1, 2))
     for frame in frames(50):
-        recent.push(frame, PlacedScan(SCAN, frame.time))
+        recent.push(frame, PlacedScan(SCAN, stretch=frame.time))
     assert len(recent._kept) == 3  # one given back, two that wait
 
 
@@ -68,9 +68,11 @@ def test_nothing_is_kept_that_no_window_asks_for() -> None:
 def test_a_gap_starts_anew(number) -> None:
     recent = RecentFrames(Window(1, 1))
     all_of_them = frames(10)
-    recent.push(all_of_them[2], PlacedScan(SCAN, all_of_them[2].time))
-    recent.push(all_of_them[3], PlacedScan(SCAN, all_of_them[3].time))
+    recent.push(all_of_them[2], PlacedScan(SCAN, stretch=all_of_them[2].time))
+    recent.push(all_of_them[3], PlacedScan(SCAN, stretch=all_of_them[3].time))
     assert recent.starts_new_recording(all_of_them[number])
-    assert recent.push(all_of_them[number], PlacedScan(SCAN, all_of_them[number].time)) is None
+    assert (
+        recent.push(all_of_them[number], PlacedScan(SCAN, stretch=all_of_them[number].time)) is None
+    )
     assert recent.waiting == 1
     assert seen(recent.pop()) == ([], [number], [])

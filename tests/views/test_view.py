@@ -1,4 +1,4 @@
-"""A view is found by its name, writes its own part of a Spec, and may see a window of scans."""
+"""A view is found by its name and writes its own part of a Spec."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -15,9 +15,9 @@ from derain.spec import Spec
 from derain.views.isolated_points import CHANNELS, IsolatedPointView
 from derain.views.neighbours import Neighbourhoods, NeighbourView
 from derain.views.range_image import RangeView
-from derain.views.spherical_grid import grid_of
+from derain.views.spherical_grid import ALL_AROUND, grid_of
 from derain.views.view import VIEWS, View
-from derain.views.window import PlacedScan, Window, WindowOfScans
+from derain.views.window import Window
 
 from ..test_spec import SPEC
 
@@ -47,16 +47,6 @@ def test_a_view_reads_back_what_it_writes(view) -> None:
     assert type(view).of(entry, channels, fill_value, threads=3) == expected
 
 
-@pytest.mark.parametrize("view", OURS.values(), ids=OURS.keys())
-def test_a_view_of_one_scan_sees_nothing_of_those_around_it(view) -> None:
-    assert view.window == Window(before=0, after=0)
-    judged, other = (PlacedScan(Scan.of(scene(200, seed))) for seed in (1, 2))
-    seen = view.of_window(WindowOfScans(judged, before=[other], after=[other]))
-    expected = view(judged.scan).inputs()
-    for name, array in seen.inputs().items():
-        np.testing.assert_array_equal(array, expected[name])
-
-
 @pytest.mark.parametrize("wrong", [-1, 51, 1.5, "two", None])
 @pytest.mark.parametrize("side", ["before", "after"])
 def test_a_window_has_a_number_of_scans_that_memory_holds(side, wrong) -> None:
@@ -73,14 +63,14 @@ def registered() -> Iterator[type[View]]:
     """A view of another package, known to derain for one test."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(VIEWS, "_members", dict(VIEWS))
-        yield VIEWS.add("change")(ChangeView)
+        yield VIEWS.add("height")(HeightView)
 
 
 @dataclass(frozen=True)
-class ChangeView(View):
-    """Sees a point's neighbours, and as its one channel how far the scan before was from it."""
+class HeightView(View):
+    """Sees a point's neighbours, and as its one channel the height above the lowest point."""
 
-    channels: tuple[str, ...] = ("change",)
+    channels: tuple[str, ...] = ("height",)
     fill_value: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
@@ -93,43 +83,35 @@ class ChangeView(View):
     def as_dict(self) -> dict[str, Any]:
         return {"kind": self.NAME}
 
-    @property
-    def window(self) -> Window:
-        return Window(before=1)
-
     def __call__(self, scan: Scan) -> Neighbourhoods:
-        return self.of_window(WindowOfScans(PlacedScan(scan)))
-
-    def of_window(self, scans: WindowOfScans) -> Neighbourhoods:
-        seen = NeighbourView(2, ("x",))(scans.scan)
-        change = np.full_like(seen.points, 99.0)
-        if scans.before:
-            former = scans.before[-1].scan.xyz
-            here = scans.scan.xyz[seen.first]
-            change = np.linalg.norm(here[:, None] - former[None], axis=2).min(axis=1)[:, None]
-        return replace(seen, points=change.astype(np.float32))
+        seen = NeighbourView(2, ("z",))(scan)
+        return replace(seen, points=seen.points - seen.points.min())
 
 
 def spec_seen_through(view: Mapping[str, Any]) -> Spec:
-    one = {"channels": ("change",), "units": ("m",), "mean": (0.0,), "std": (1.0,)}
+    one = {"channels": ("height",), "units": ("m",), "mean": (0.0,), "std": (1.0,)}
     return replace(SPEC, view=view, **one)
 
 
-def test_a_view_of_another_package_sees_a_window_and_stands_in_a_spec(registered) -> None:
+def test_a_view_of_another_package_stands_in_a_spec(registered) -> None:
     spec = spec_seen_through(registered().as_dict())
     view = Spec.from_dict(spec.as_dict(), "model").make_view()
     assert isinstance(view, registered)
-    former, now = (Scan.of(scene(50)[rows]) for rows in (slice(40), slice(None)))
-    seen = view.of_window(WindowOfScans(PlacedScan(now, 0.2), [PlacedScan(former, 0.1)]))
-    here, there = now.xyz[seen.first].astype(float), former.xyz.astype(float)
-    expected = [min(np.linalg.norm(point - other) for other in there) for point in here]
-    np.testing.assert_allclose(seen.inputs()["points"][:, 0], expected, rtol=1e-5, atol=1e-6)
-    assert (np.array(expected) > 0).sum() == 10
-    # At the start of a sequence there is none before it.
-    assert (view(now).inputs()["points"] == 99).all()
+    scan = Scan.of(scene(50))
+    seen = view(scan)
+    height = scan.xyz[seen.first, 2] - scan.xyz[:, 2].min()
+    np.testing.assert_array_equal(seen.inputs()["points"][:, 0], height)
+    assert view.azimuth == ALL_AROUND
+
+
+@pytest.mark.parametrize("view", OURS.values(), ids=OURS.keys())
+def test_a_model_file_that_asks_for_scans_around_one_is_refused(view) -> None:
+    asked = {**view.as_dict(), "window": {"before": 1, "after": 0}}
+    with pytest.raises(InputError, match=r"view\.window: there is no such key"):
+        replace(SPEC, view=asked).make_view()
 
 
 def test_without_the_package_its_spec_is_refused() -> None:
-    spec = spec_seen_through({"kind": "change"})
-    with pytest.raises(InputError, match=r"view\.kind: unknown view 'change'\. Upgrade derain"):
+    spec = spec_seen_through({"kind": "height"})
+    with pytest.raises(InputError, match=r"view\.kind: unknown view 'height'\. Upgrade derain"):
         spec.make_view()
