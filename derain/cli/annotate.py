@@ -70,12 +70,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="METRES",
         help="label radar points within METRES of a LiDAR point (default: %(default)s)",
     )
-    parser.add_argument(
-        "--picture",
-        action=argparse.BooleanOptionalAction,
-        default=True,
-        help="draw the sequence's middle scan (default: yes)",
-    )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     for option in ("--columns", "--radar-columns"):
         add_columns(parser, option)
@@ -115,19 +109,18 @@ def main(arguments: argparse.Namespace) -> int:
             labelled = scan.with_label(label)
             transferred = transfer_labels(labelled, detections.xyz, arguments.within)
             radar_sink.write(radar[frame.key], None, transferred)
+    picture = arguments.out / f"{sequence}.png"
+    scan = source[len(source) // 2].read()
+    title = f"sequence {sequence}, {Path(scan.name).name}: {len(scan):,} points"
+    save(annotation_figure(scan, annotate(scan, scene, plane), scene, title), picture)
     report: dict[str, Any] = {
         "sequence": sequence,
         "scans": len(source),
         "points": points.total(),
         "points_by_class": {name: points[id_] for id_, name in CLASS_NAMES.items()},
         "plane": {**asdict(plane), "slope": plane.slope},
+        "picture": str(picture),
     }
-    if arguments.picture:
-        picture = arguments.out / f"{sequence}.png"
-        scan = source[len(source) // 2].read()
-        title = f"sequence {sequence}, {Path(scan.name).name}: {len(scan):,} points"
-        save(annotation_figure(scan, annotate(scan, scene, plane), scene, title), picture)
-        report["picture"] = str(picture)
     print_lines(json.dumps(report) if arguments.json else _as_text(report))
     return 0
 
@@ -151,6 +144,4 @@ def _as_text(report: dict[str, Any]) -> str:
     ]
     for name, count in report["points_by_class"].items():
         lines.append(f"  {name:<11}{count:>14,} {count / max(points, 1):>8.2%}")
-    if "picture" in report:
-        lines.append(report["picture"])
-    return "\n".join(lines)
+    return "\n".join([*lines, report["picture"]])

@@ -73,12 +73,6 @@ def add_arguments(parser: Parser) -> None:
     )
     parser.add_argument("--limit", type=count, help="number of scans, evenly spread (default: all)")
     parser.add_argument(
-        "--distinct",
-        action=argparse.BooleanOptionalAction,
-        help="count points at the same position once, as published results on WADS do "
-        "(default: from the data card)",
-    )
-    parser.add_argument(
         "--rain-rates",
         type=Path,
         metavar="YAML",
@@ -99,11 +93,10 @@ def add_arguments(parser: Parser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    topic, distinct = arguments.topic, arguments.distinct
-    data = labelled(arguments.data, arguments, topic, distinct)
+    data = labelled(arguments.data, arguments, arguments.topic)
     training = data
     if arguments.train:
-        training = labelled(arguments.train, arguments, topic, distinct)
+        training = labelled(arguments.train, arguments, arguments.topic)
     rates = rain_rates(arguments.data, arguments.rain_rates)
 
     def labelled_frames(scans: LabelledScans, frames: Sequence[Frame]) -> LabelledFrames:

@@ -1,10 +1,10 @@
 """Shows every step from scans to a deployed model, on simulated rain.
 
 First the model that comes with derain cleans two simulated scans, or with --scan scans of your own.
-Then the command simulates rain in streets and draws a scan of it; trains 3D-OutDet, SalsaNext and
-LiSnowNet-L1 on the scans, the last without labels; exports and proves each; cleans scans; and
-compares the networks with filters, with the model that comes with derain, and with baselines that
-every method has to beat.
+Then the command simulates rain in streets; trains 3D-OutDet, SalsaNext and LiSnowNet-L1 on the
+scans, the last without labels; exports and proves each; cleans scans; and compares the networks
+with filters, with the model that comes with derain, and with baselines that every method has to
+beat.
 
   derain demo
   derain demo --out somewhere
@@ -42,7 +42,7 @@ def main(arguments: argparse.Namespace) -> int:
     print(f"Simulated rain, from streets to a table. Everything goes to {out}/\n")
     config = DemoConfig(out, settings=settings, scan=arguments.scan, columns=arguments.columns)
     run_demo(config, print_lines)
-    pictures = "yours/before_after.png", "filters.png", "before_after.png", "bench/speed_error.png"
+    pictures = "yours/before_after.png", "before_after.png", "bench/speed_error.png"
     print_lines(f"Pictures in {out}: {', '.join(pictures)}")
     print_lines(f"Training: tensorboard --logdir {out / 'runs'}")
     return 0

@@ -81,19 +81,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     for sensor in ("lidar", "radar"):
         add_columns(parser, f"--{sensor}-columns", of=f"the {sensor}'s ")
-    parser.add_argument(
-        "--metadata-columns",
-        type=_two_names,
-        default=",".join(FRAME_COLUMNS),
-        help=f"columns of {METADATA} with the name and the time of a scan (default: %(default)s)",
-    )
-
-
-def _two_names(text: str) -> list[str]:
-    names = text.split(",")
-    if len(names) != 2:
-        raise argparse.ArgumentTypeError(f"{text} is not two names with a comma between")
-    return names
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -106,8 +93,8 @@ def main(arguments: argparse.Namespace) -> int:
     lidar = named_frames([arguments.lidar], arguments.lidar_columns, layouts=())
     radar = named_frames([arguments.radar], arguments.radar_columns, layouts=())
     folder_sink(scans, lidar)
-    times = _times(lidar, arguments.metadata_columns)
-    nearest = nearest_in_time(times, _times(radar, arguments.metadata_columns), arguments.within)
+    times = _times(lidar)
+    nearest = nearest_in_time(times, _times(radar), arguments.within)
     if (nearest < 0).all():
         reason = f"no frame is within {arguments.within:g} s of a LiDAR scan"
         remedy = "Check that the timestamps are seconds of one clock, or widen --within."
@@ -133,9 +120,9 @@ def main(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _times(frames: Source, columns: Sequence[str]) -> Floats:
+def _times(frames: Source) -> Floats:
     """Times of the frames in seconds, from the metadata in their folders."""
-    return read_frame_times([Path(frame.name) for frame in frames], columns)
+    return read_frame_times([Path(frame.name) for frame in frames])
 
 
 def _write_metadata(

@@ -189,10 +189,7 @@ def add_data(parser: argparse.ArgumentParser, part: str) -> None:
 
 
 def labelled(
-    paths: Sequence[Path],
-    arguments: argparse.Namespace,
-    topic: str | None = None,
-    distinct: bool | None = None,
+    paths: Sequence[Path], arguments: argparse.Namespace, topic: str | None = None
 ) -> "LabelledScans":
     """The labelled scans that a command line names.
 
@@ -201,7 +198,6 @@ def labelled(
         arguments: The options, of which those for the data card, the columns and the scale of
             intensities are used.
         topic: Topic of point clouds in bags; None where the paths name it.
-        distinct: True if points at one position count once; None follows the data card.
 
     Raises:
         InputError: Data whose labels nothing explains, or a root without sequences.
@@ -209,8 +205,7 @@ def labelled(
     from derain.datamodules.labelled import card_of, labelled_scans
     from derain.datamodules.scan_data import Loading
 
-    columns, scale = arguments.columns, arguments.intensity_scale
-    loading = Loading(columns=columns, intensity_scale=scale, deduplicate=distinct)
+    loading = Loading(columns=arguments.columns, intensity_scale=arguments.intensity_scale)
     return labelled_scans(paths, card_of(paths, arguments.card), loading, topic)
 
 
@@ -222,18 +217,18 @@ def command_line(
     Args:
         arguments: The parsed arguments, with the name of the command.
         positional: Name of the positional argument, if there is one.
-        without: Names of arguments that change no result, and of all flags without a ``--no-``.
+        without: Names of arguments that change no result, and of all flags.
     """
     words = ["derain", arguments.command]
     for name, value in vars(arguments).items():
         if name in ("command", *without) or value is None:
             continue
         if name != positional:
-            words.append(f"--{'no-' if value is False else ''}{name.replace('_', '-')}")
+            words.append(f"--{name.replace('_', '-')}")
         if isinstance(value, tuple):  # names between commas
             words.append(",".join(value))
         elif isinstance(value, list):
             words += map(str, value)
-        elif not isinstance(value, bool):
+        else:
             words.append(str(value))
     return printable(shlex.join(words))

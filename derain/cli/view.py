@@ -8,7 +8,7 @@ sensor; or writes a recording for Rerun's viewer.
   derain view scan.bin --card wads --methods outdet.onnx tuned=dsor.yaml dror --out figure.png
   derain view scan.bin --methods outdet.onnx --window
   derain view recording/ --methods default dsor --rerun out.rrd    then: rerun out.rrd
-  derain view recording/ --card wads --every 10 --rerun out.rrd
+  derain view recording/ --card wads --frames ::10 --rerun out.rrd
   derain view recording/ --methods persistence --poses odometry --frames 0:50 --rerun out.rrd
   derain view drive.mcap/velodyne_points/000012 --out figure.png
 
@@ -73,15 +73,9 @@ def add_arguments(parser: Parser) -> None:
         "--frames",
         type=_numbers,
         default=slice(None),
-        metavar="FROM:TO",
-        help="with --rerun, show only scans FROM up to but not including TO, from 0 (default: all)",
-    )
-    parser.add_argument(
-        "--every",
-        type=options.count,
-        default=1,
-        metavar="N",
-        help="with --rerun, show every Nth scan (default: 1)",
+        metavar="FROM:TO[:STEP]",
+        help="with --rerun, show only scans FROM up to but not including TO, from 0, or one in "
+        "STEP of them (default: all)",
     )
     parser.add_argument(
         "--card", help="data card of the scans' labels (beside them or in ../labels), such as wads"
@@ -94,11 +88,11 @@ def add_arguments(parser: Parser) -> None:
 
 
 def _numbers(text: str) -> slice:
-    """Places of scans, such as ``10:20``, ``10:`` or ``:20``."""
-    first, colon, end = text.partition(":")
-    if not colon:
-        raise argparse.ArgumentTypeError(f"{text} is not FROM:TO, such as 10:20")
-    return slice(*(whole(part) if part else None for part in (first, end)))
+    """Places of scans, such as ``10:20``, ``10:`` or ``::5``."""
+    parts = [whole(part) if part else None for part in text.split(":")]
+    if len(parts) not in (2, 3) or any(step is not None and step < 1 for step in parts[2:]):
+        raise argparse.ArgumentTypeError(f"{text} is not FROM:TO[:STEP], such as 10:20 or ::5")
+    return slice(*parts)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -142,7 +136,7 @@ def _view_recording(arguments: argparse.Namespace) -> int:
     )
     from derain.pictures.selection import Labels, Selection
 
-    selection = Selection(source, range(len(source))[arguments.frames][:: arguments.every])
+    selection = Selection(source, range(len(source))[arguments.frames])
     if card is not None and not any(frame.has_labels for frame in selection.frames):
         warn(f"{selection.frames[0].name}: no scan has labels, so no truth is shown")
         card = None

@@ -18,18 +18,17 @@ METADATA = "metadata.csv"
 # Bytes of the lines of a hundred thousand scans. In memory a line takes up to forty times as much.
 LARGEST_METADATA = 2**23
 
-# Names of the columns that hold a scan's name and its time; those of REHEARSE-3D are not published.
+# Names of the columns that hold a scan's name and its time.
 FRAME_COLUMNS = ("frame", "timestamp")
 
 
-def read_frame_times(scans: Sequence[Path], columns: Sequence[str] = FRAME_COLUMNS) -> Floats:
+def read_frame_times(scans: Sequence[Path]) -> Floats:
     """Reads when scans of one folder were taken.
 
     Args:
         scans: The scans, at least one. A line of the ``metadata.csv`` beside them belongs to the
             scan of that name. Suffixes and leading zeros do not count: 000012.bin, 000012 and 12
             are one name, and so are 1634567.25.bin and 1634567.25.
-        columns: Names of two columns: the scan's name, and its time.
 
     Returns:
         The time of each scan, float64 (N,), in the file's own unit, which should be seconds.
@@ -43,10 +42,10 @@ def read_frame_times(scans: Sequence[Path], columns: Sequence[str] = FRAME_COLUM
         raise InputError(
             path,
             "there is no such file",
-            f"Write one: a line {','.join(columns)}, then one for each scan, such as 000000,12.3.",
+            "Write one: a line frame,timestamp, then one for each scan, such as 000000,12.3.",
         )
     times: dict[str, float] = {}
-    for name, text in _lines(path, columns):
+    for name, text in _lines(path):
         if not name:
             raise InputError(path, "has a line that names no scan", "Complete it or leave it out.")
         time = _finite(path, text)
@@ -58,18 +57,17 @@ def read_frame_times(scans: Sequence[Path], columns: Sequence[str] = FRAME_COLUM
     return np.array([times[_key(scan.name)] for scan in scans])
 
 
-def _lines(path: Path, columns: Sequence[str]) -> Iterator[list[str]]:
-    """Values of some columns, line by line."""
+def _lines(path: Path) -> Iterator[list[str]]:
+    """The name and the time of a scan, line by line."""
     with reading(path, ValueError, csv.Error):
         text = read_bytes(path, LARGEST_METADATA).decode("utf-8-sig")
         lines = csv.DictReader(io.StringIO(text, newline=""), restval="", skipinitialspace=True)
         present = lines.fieldnames or ()
-        if not set(columns) <= set(present):
-            reason = f"has no columns {' and '.join(columns)} ({', '.join(present)})"
-            remedy = "Name those of the scan's name and its time with --metadata-columns."
-            raise InputError(path, reason, remedy)
+        if not set(FRAME_COLUMNS) <= set(present):
+            reason = f"has no columns {' and '.join(FRAME_COLUMNS)} ({', '.join(present)})"
+            raise InputError(path, reason, "Rename those of the scan's name and its time.")
         for line in lines:
-            yield [line[name] for name in columns]
+            yield [line[name] for name in FRAME_COLUMNS]
 
 
 def _key(name: str) -> str:

@@ -41,28 +41,6 @@ MOST_PANELS_IN_A_ROW = 5
 TITLE_WIDTH = 44
 
 
-def judgement_figure(scan: Scan, predicted: Bools, rain: Bools, title: str) -> Figure:
-    """Input, truth, prediction and error of one scan, from above and as the sensor sees it.
-
-    Args:
-        scan: The scan.
-        predicted: Points called rain, bool (N,).
-        rain: Points that are rain, bool (N,).
-        title: Heading.
-    """
-    figure = titled_figure(16, 7, title)
-    columns = figure.subplots(2, 4, sharex="row", sharey="row").T
-    panels = {
-        input_title(scan): None,
-        "truth": rain.astype(int),
-        "prediction": predicted.astype(int),
-        "error": outcomes(predicted, rain),
-    }
-    draw_columns(columns, [(name, scan, outcome) for name, outcome in panels.items()])
-    explain_colours(figure)
-    return figure
-
-
 def before_after_figure(scan: Scan, predicted: Bools, title: str) -> Figure:
     """One scan with the rain found in it, and without that rain.
 

@@ -14,12 +14,12 @@ from derain.example import EXAMPLE, Truth
 from derain.export.bench.bench import Bench, bench
 from derain.export.bench.cost import Effort
 from derain.export.bench.report import SHORT, main_table
-from derain.export.methods import load_method, load_method_of_one_scan, named_method
+from derain.export.methods import load_method, load_method_of_one_scan
 from derain.files import DEFAULT_COLUMNS
 from derain.files.atomic import require_writable
 from derain.files.labels import LABEL
 from derain.jobs.workers import processes
-from derain.pictures.scan_pictures import before_after_figure, comparison_figure, save
+from derain.pictures.scan_pictures import before_after_figure, save
 from derain.simulation.campaign import Campaign, partition
 from derain.simulation.dataset import simulate_track
 from derain.sources.cleaned_scan import ScanOutcome
@@ -102,8 +102,8 @@ def run_demo(config: DemoConfig, show: Show = show_nothing) -> Bench:
     Raises:
         InputError: The error of a step.
     """
-    # Cleaning, simulation, tuning, picture and comparison; cleaning once more by the first network.
-    steps = Steps(show, 5 + 2 * len(config.networks) + bool(config.networks))
+    # Cleaning, simulation, tuning and comparison; cleaning once more by the first network.
+    steps = Steps(show, 4 + 2 * len(config.networks) + bool(config.networks))
     clean_given_scans(config.scan or Path(EXAMPLE), config.columns, config.out / "yours", steps)
     steps.begin(f"Simulation: rain in {len(config.streets.names)} streets")
     with processes(config.workers) as executor:
@@ -112,7 +112,6 @@ def run_demo(config: DemoConfig, show: Show = show_nothing) -> Bench:
     data = labelled_scans([config.data], card_of([config.data], None), Loading())
     _tune(config, data, steps)
     frame = _rainiest(config, data)
-    _draw_filters(config, data, frame, steps)
     for title in config.networks:
         _train(config, title, steps)
         if title == config.networks[0]:
@@ -137,22 +136,6 @@ def _rainiest(config: DemoConfig, data: ScanData) -> Frame:
     """The last scan of the test sequence with the highest rain rate."""
     rates = rain_rates([config.data], None)
     return max(data.frames("test"), key=lambda frame: (rates[frame.sequence], frame.key))
-
-
-def _draw_filters(config: DemoConfig, data: ScanData, frame: Frame, steps: Steps) -> None:
-    picture = config.out / "filters.png"
-    steps.begin("Picture: two filters on the scan with the most rain")
-    scan = data.read(frame)
-    known = ~data.card.unknown_of(scan)
-    methods = {"dror": "dror", "dsor, tuned": str(config.tuned)}
-    removed = {
-        title: load_method_of_one_scan(*named_method(name)).judge(scan).rain[known]
-        for title, name in methods.items()
-    }
-    title = f"{Path(frame.name).name}: {len(scan):,} points"
-    rain = data.card.rain_of(scan)[known]
-    save(comparison_figure(scan.take(known), removed, rain, title), picture)
-    steps.end(str(picture))
 
 
 def _train(config: DemoConfig, title: str, steps: Steps) -> None:

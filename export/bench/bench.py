@@ -107,7 +107,6 @@ def bench(
     train: GivenScans | None = None,
     columns: Sequence[str] = DEFAULT_COLUMNS,
     intensity_scale: float = 1.0,
-    distinct: bool | None = None,
     rain_rates: Mapping[str, float] | None = None,
     threads: int = 0,
     timed: int = 10,
@@ -140,7 +139,6 @@ def bench(
         train: Labelled scans that ``position`` and ``intensity`` learn from.
         columns: Names of the columns of files that do not name them.
         intensity_scale: Factor from the scans' intensities to the unit of the methods, e.g. 255.
-        distinct: True if points at one position count once; None follows the card.
         rain_rates: Rain rate in mm/h by sequence, where it is known.
         threads: Threads of views and networks; 0 takes every core this process may use.
         timed: Scans that each method is timed on, spread evenly.
@@ -158,8 +156,7 @@ def bench(
             one that cannot be read or has no labels. The row of a method that fails states so.
     """
     card = card if isinstance(card, DataCard) else load_card(card)
-    deduplicate = card.deduplicate if distinct is None else distinct
-    reader = FrameReader(card, intensity_scale, distinct=deduplicate)
+    reader = FrameReader(card, intensity_scale, distinct=card.deduplicate)
 
     def labelled(given: GivenScans) -> LabelledFrames:
         return LabelledFrames(reader, source_of(given, columns), rain_rates or {})

@@ -13,7 +13,7 @@ from derain.learning.batch import Batch
 from derain.models.base import DerainingModule
 from derain.models.callbacks.step_times import SPEED, STEP
 from derain.pictures.error_pictures import errors_figure, operating_points_figure
-from derain.pictures.scan_pictures import judgement_figure
+from derain.pictures.scan_pictures import comparison_figure
 from derain.scan import Floats, Ints
 
 # Groups of scalars.
@@ -78,7 +78,7 @@ class DrawnEpochs:
 
 
 class ScanPanels(lightning.Callback):
-    """Logs input, truth, prediction and error of the first rainy validation scans.
+    """Logs input, truth and prediction of the first rainy validation scans.
 
     Of several processes the first draws, of the scans that it measures.
 
@@ -118,7 +118,8 @@ class ScanPanels(lightning.Callback):
             rain = model.card.rain_of(scan)
             if not rain.any():
                 continue
-            figure = judgement_figure(scan, probability > model.spec.threshold, rain, scan.name)
+            called = {"prediction": probability > model.spec.threshold}
+            figure = comparison_figure(scan, called, rain, scan.name)
             name = f"validation scan {self.scans - self.left}"
             trainer.logger.experiment.add_figure(name, figure, trainer.global_step)
             self.left -= 1

@@ -62,19 +62,19 @@ def test_a_sequence_is_labelled_counted_and_drawn(succeed) -> None:
 
 
 def test_the_text_holds_the_plane_and_the_points_by_class(succeed) -> None:
-    lines = succeed(*ANNOTATE, "out", "--no-picture").out.splitlines()
+    lines = succeed(*ANNOTATE, "out").out.splitlines()
     assert lines[0] == "sequence 003: 3 scans, 6,000 points"
     assert lines[1].startswith("road: 1.")
-    counts = {line.split()[0]: line.split()[1] for line in lines[2:]}
+    counts = {line.split()[0]: line.split()[1] for line in lines[2:-1]}
     assert list(counts) == [*(kind.name.lower() for kind in TrackClass), "unknown"]
     assert sum(int(count.replace(",", "")) for count in counts.values()) == 6000
-    assert not list(Path("out").glob("*.png"))
+    assert lines[-1] == str(Path("out/003.png"))
 
 
 def test_corrections_are_those_of_the_sequence_named(succeed) -> None:
     rain = {}
     for name in ("003", "007"):
-        succeed(*ANNOTATE, name, "--no-picture", "--sequence", name)
+        succeed(*ANNOTATE, name, "--sequence", name)
         rain[name] = np.sum(np.array(labels(Path(name))) == TrackClass.RAIN)
     assert rain["007"] > rain["003"] + 1000  # nothing keeps the wall from being rain
 
@@ -84,7 +84,7 @@ def test_radar_points_take_the_label_of_the_nearest_point(succeed) -> None:
     points[-1] = (500, 0, 0, 0)
     write_scan(Path("radar/000001.bin"), Scan.of(points))
     out = Path("out")
-    succeed(*ANNOTATE, out, "--no-picture", "--radar", "radar")
+    succeed(*ANNOTATE, out, "--radar", "radar")
     (radar,) = labels(out / "radar", 20)
     assert radar[:-1].tolist() == labels(out)[1][::100][:-1].tolist()
     assert radar[-1] == UNKNOWN

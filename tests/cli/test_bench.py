@@ -138,7 +138,7 @@ def test_a_threshold_tuned_on_training_scans_is_warned_of(succeed, root, tmp_pat
 
 
 def test_the_command_in_the_report_makes_the_same_figures_again(succeed, root, tmp_path) -> None:
-    options = ["--limit", "2", "--distinct", "--seed", "3", *ONCE]
+    options = ["--limit", "2", "--seed", "3", *ONCE]
     first, again = tmp_path / "first", tmp_path / "again"
     succeed("bench", "--data", root, "--methods", "t=dsor", "all", *options, "--out", first)
     derain, *words = read_report(first)["command"].split()
@@ -165,17 +165,13 @@ def test_baselines_learn_nothing_from_points_that_may_be_rain_or_not(succeed, tm
         assert list(row["counts"].values()) == [4, 0, 0, 40], row["method"]
 
 
-def test_points_that_a_scan_holds_twice_are_counted_once_unless_an_option_asks_for_all(
+def test_points_that_a_scan_holds_twice_are_counted_once_if_its_card_says_so(
     succeed, tmp_path
 ) -> None:
     rows = np.random.default_rng(0).permutation(np.resize(np.arange(300), 420))
     scene(300)[rows].tofile(tmp_path / "scan.bin")
     write_labels(tmp_path / "scan.label", np.where(rows >= 240, 110, 40))
     options = ["--data", tmp_path / "scan.bin", "--card", "wads", "--methods", "all", *ONCE]
-    succeed("bench", *options, "--no-distinct", "--out", tmp_path)
-    every = read_report(tmp_path)
-    assert "--no-distinct" in every["command"]
-    assert sum(every["rows"][0]["counts"].values()) == 420
     succeed("bench", *options, "--out", tmp_path)
     assert list(read_report(tmp_path)["rows"][0]["counts"].values()) == [60, 240, 0, 0]
     assert "# WADS, 1 scan, 300 points" in (tmp_path / "bench.md").read_text()

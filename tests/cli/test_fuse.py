@@ -61,10 +61,7 @@ def test_each_scan_is_joined_by_the_radar_frame_nearest_in_time(succeed) -> None
 
 
 def test_the_metadata_name_what_was_joined_to_what(succeed) -> None:
-    for sensor in ("lidar", "radar"):
-        path = Path(sensor, "metadata.csv")
-        path.write_text(path.read_text().replace("frame,timestamp", "stem,seconds"))
-    succeed(*FUSE, "--within", "0.1", "--metadata-columns", "stem,seconds")
+    succeed(*FUSE, "--within", "0.1")
     rows = read_rows(Path("out/lidar_radar_pcd/metadata.csv"))
     assert [row["frame"] for row in rows] == ["000000", "000001", "000002"]
     assert [float(row["timestamp"]) for row in rows] == [0.0, 0.1, 0.2]
@@ -109,7 +106,6 @@ def put_on_another_clock() -> None:
         (None, ["--extra", "doppler"], "has no column doppler of numbers (x, y, z, intensity)"),
         (None, ["--radar-columns", "x,y,z,doppler,rcs"], "are not whole rows of 20 bytes"),
         (None, ["--lidar-columns", "x,y,z"], "Name the file's columns with --lidar-columns"),
-        (None, ["--metadata-columns", "frame"], "frame is not two names"),
     ],
 )
 def test_what_cannot_be_fused_is_one_line_and_exit_code_2(refused, spoil, options, reason) -> None:

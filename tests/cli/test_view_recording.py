@@ -118,7 +118,7 @@ def test_some_scans_are_shown_and_a_method_of_several_scans_sees_all(
     whole, some = tmp_path / "whole.rrd", tmp_path / "some.rrd"
     options = ["--poses", "standing", "--methods", "persistence"]
     succeed("view", recording, *options, "--rerun", whole)
-    succeed("view", recording, *options, "--every", "2", "--frames", "1:", "--rerun", some)
+    succeed("view", recording, *options, "--frames", "1::2", "--rerun", some)
     entity = "/sensor/methods/persistence/removed"
     of_all, of_some = (ReadBack(file).points(entity) for file in (whole, some))
     assert list(of_some) == [1, 3]
@@ -166,6 +166,7 @@ def test_a_scan_that_cannot_be_read_is_reported_once_and_shown_empty(
     [
         (["--rerun", "out.png"], "out.png: must end in .rrd"),
         (["--rerun", "out.rrd", "--frames", "9:"], "none of them is among the 4 scans"),
+        (["--rerun", "out.rrd", "--frames", "::0"], "::0 is not FROM:TO[:STEP]"),
         (["--rerun", "out.rrd", "--methods", "nothing"], "nothing: no such method or file"),
         (
             ["--rerun", "out.rrd", "--methods", "dror", "dror"],

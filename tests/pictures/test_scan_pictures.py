@@ -18,7 +18,6 @@ from derain.pictures.scan_pictures import (
     MOST_PANELS_IN_A_ROW,
     before_after_figure,
     comparison_figure,
-    judgement_figure,
     save,
     show_comparison,
 )
@@ -68,19 +67,6 @@ def judged() -> tuple[Scan, np.ndarray, np.ndarray]:
     return scan, predicted & scan.valid, rain
 
 
-def test_the_panels_of_a_judgement_count_what_became_of_the_points(judged) -> None:
-    scan, predicted, rain = judged
-    shown = panels(judgement_figure(scan, predicted, rain, "a scan"))
-    assert list(shown) == ["input: intensity", "truth", "prediction", "error"]
-    for title, pair in {
-        "truth": (rain, rain),
-        "prediction": (predicted, predicted),
-        "error": (predicted, rain),
-    }.items():
-        assert [dots(axes) for axes in shown[title]] == [expected(*pair, scan.valid)] * 2
-    assert [len(places(axes)) for axes in shown["input: intensity"]] == [196] * 2
-
-
 def test_each_method_shows_what_it_removes_leaves_and_loses(judged) -> None:
     scan, first, rain = judged
     second = ~first & scan.valid
@@ -95,6 +81,7 @@ def test_each_method_shows_what_it_removes_leaves_and_loses(judged) -> None:
     ]
     for called, pair in zip((rain, first, second), [*shown.values()][1:], strict=True):
         assert [dots(axes) for axes in pair] == [expected(called, rain, scan.valid)] * 2
+    assert [len(places(axes)) for axes in shown["input: intensity"]] == [196] * 2
     assert [text.get_text() for text in figure.legends[0].get_texts()] == [*OUTCOMES]
 
 
@@ -144,8 +131,8 @@ def test_no_row_of_panels_is_left_with_one_and_no_title_runs_into_another() -> N
 def test_rare_outcomes_are_drawn_larger_and_on_top() -> None:
     scan = Scan.of(scene(20_000))
     predicted, rain = np.arange(20_000) >= 19_970, np.arange(20_000) >= 19_000
-    figure = judgement_figure(scan, predicted, rain, "a scan")
-    drawn = panels(figure)["error"][0].collections  # from the lowest to the topmost
+    figure = comparison_figure(scan, {"one": predicted}, rain, "a scan")
+    drawn = [*panels(figure).values()][-1][0].collections  # from the lowest to the topmost
     assert [len(each.get_offsets()) for each in drawn] == [19_000, 970, 30]
     kept, left, removed = (each.get_sizes()[0] for each in drawn)
     assert removed > 3 * left >= 3 * kept

@@ -39,7 +39,7 @@ def test_every_step_is_shown_and_leaves_its_files(small) -> None:
     bench = run_demo(small, lines.append)
     steps = [line.partition(":")[0] for line in lines if re.match(r"[A-Z]\w+: ", line)]
     of_network = ["Training", "Export", "Cleaning"]
-    assert steps == ["Cleaning", "Simulation", "Tuning", "Picture", *of_network, "Comparison"]
+    assert steps == ["Cleaning", "Simulation", "Tuning", *of_network, "Comparison"]
     assert any(line.endswith(f"(step {len(steps)} of {len(steps)})") for line in lines)
     times = [line for line in lines if re.match(r"  \d+:\d\d  \S", line)]
     assert len(times) == len(steps)
@@ -52,12 +52,7 @@ def test_every_step_is_shown_and_leaves_its_files(small) -> None:
 
     out = small.out
     assert any("points are rain or snow" in line for line in lines)
-    for picture in (
-        "yours/before_after.png",
-        "filters.png",
-        "before_after.png",
-        "bench/speed_error.png",
-    ):
+    for picture in ("yours/before_after.png", "before_after.png", "bench/speed_error.png"):
         assert imread(out / picture)[..., :3].std() > 0
     (scan,) = (out / "simulated/sequences/002/lidar_radar_pcd").glob("*.bin")
     rain = np.fromfile(out / "cleaned" / f"{scan.stem}.label", "<u4") == 1

@@ -89,7 +89,7 @@ def rainy(tmp_path) -> Folder:
     return Folder(str(tmp_path), "wads", **parts, loading=Loading(batch_size=4))
 
 
-Drawn = tuple[Scan, Bools, Bools, str]
+Drawn = tuple[Scan, dict[str, Bools], Bools, str]
 
 
 @pytest.fixture
@@ -101,7 +101,7 @@ def drawn(monkeypatch) -> list[Drawn]:
         calls.append(arguments)
         return Figure(figsize=(0.1, 0.1))
 
-    monkeypatch.setattr(panels, "judgement_figure", figure)
+    monkeypatch.setattr(panels, "comparison_figure", figure)
     return calls
 
 
@@ -132,7 +132,7 @@ def test_the_first_rainy_scans_are_drawn_after_every_epoch(
     for (scan, predicted, rain, title), prediction in zip(drawn, predictions, strict=True):
         assert title == scan.name
         np.testing.assert_array_equal(rain, np.arange(len(scan)) >= 40)
-        np.testing.assert_array_equal(predicted, prediction)
+        np.testing.assert_array_equal(predicted["prediction"], prediction)
 
     events = EventAccumulator(str(tmp_path / "log"), {"images": 0}).Reload()
     names = [f"validation scan {number}" for number in range(len(expected))]
