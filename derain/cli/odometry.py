@@ -1,10 +1,10 @@
 """Registers each scan to the scan before it, and writes the poses of the sensor.
 
-A line per scan holds the transform of its points into the frame of the first scan.
+A line per scan holds the transform of its points into the frame of the first scan, as twelve
+numbers (KITTI's format).
 
   derain odometry drive --out poses.txt
   derain odometry drive --out drive/poses.txt               later commands read them there
-  derain odometry drive --out drive.tum --format tum        time x y z qx qy qz qw
   derain odometry WADS --out poses                          poses/11.txt, poses/12.txt, ...
   derain odometry drive --out poses.txt --json
 
@@ -26,7 +26,6 @@ from derain.recordings.odometry import Registration
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.sources.judging import Failures
-from derain.sources.records import POSES
 from derain.stores.url import place_of
 from derain.system.stopwatch import Stopwatch
 from derain.workflows.odometry import find_poses
@@ -47,16 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         required=True,
         help="file to write; for several sequences, folder of files <sequence>.txt",
     )
-    parser.add_argument(
-        "--format",
-        choices=("kitti", "tum"),
-        default="kitti",
-        help="format of a line: the twelve numbers of a matrix (kitti), or time, position and "
-        "quaternion (tum; the scans need times) (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--replace", action="store_true", help=f"replace a {POSES} that belongs to the scans"
-    )
+    parser.add_argument("--replace", action="store_true", help="replace a file that exists")
     add_json(parser)
     add_threads(parser)
     add_columns(parser)
@@ -69,7 +59,6 @@ def main(arguments: argparse.Namespace) -> int:
     recordings = find_poses(
         source,
         arguments.out,
-        form=arguments.format,
         replace=arguments.replace,
         threads=arguments.threads,
         guard=Failures(print_error).skipping_failures,

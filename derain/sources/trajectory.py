@@ -133,33 +133,22 @@ def read_trajectory(path: Path) -> Trajectory:
     return Trajectory(poses, name=path)
 
 
-def write_trajectory(path: Path, trajectory: Trajectory) -> None:
-    """Writes poses whole or not at all, as :func:`read_trajectory` reads them.
+def write_trajectory(path: Path, poses: Floats) -> None:
+    """Writes poses in KITTI's form, whole or not at all, as :func:`read_trajectory` reads them.
 
     Args:
-        path: The file. Beside a ``calib.txt``, poses without times are written as the camera's.
-        trajectory: The sensor's poses; in TUM's form where their times are known, else in KITTI's.
+        path: The file. Beside a ``calib.txt``, the poses are written as the camera's.
+        poses: Sensor to world, float64 (T, 4, 4), metres.
 
     Raises:
         InputError: It cannot be written, or the ``calib.txt`` beside it cannot be read.
     """
-    if trajectory.times is None:
-        poses = trajectory.poses
-        calibration = path.with_name(CALIBRATION)
-        if is_file(calibration):
-            to_camera = _lidar_to_camera(calibration)
-            poses = to_camera @ poses @ np.linalg.inv(to_camera)
-        lines = [_words(pose[:3].ravel()) for pose in poses]
-    else:
-        lines = [
-            f"{time:.6f} {_words(pose[:3, 3])} {_words(quaternion_of(pose[:3, :3]))}"
-            for time, pose in zip(trajectory.times, trajectory.poses, strict=True)
-        ]
+    calibration = path.with_name(CALIBRATION)
+    if is_file(calibration):
+        to_camera = _lidar_to_camera(calibration)
+        poses = to_camera @ poses @ np.linalg.inv(to_camera)
+    lines = [" ".join(f"{number:.12g}" for number in pose[:3].ravel()) for pose in poses]
     write_text(path, "".join(f"{line}\n" for line in lines))
-
-
-def _words(numbers: Floats) -> str:
-    return " ".join(f"{number:.12g}" for number in numbers)
 
 
 def _trajectory_of_tum(path: Path, rows: Floats) -> Trajectory:

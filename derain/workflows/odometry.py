@@ -1,21 +1,16 @@
 """Finds where a sensor was, scan by scan, and writes its poses."""
 
 import math
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from dataclasses import replace as replaced
-from itertools import pairwise
 from pathlib import Path
 from statistics import median
-from typing import Literal
 
 import numpy as np
 from tqdm import tqdm
 
-from derain.cards.layout import folder_above
 from derain.errors import InputError
-from derain.files import RECORDS
 from derain.files.atomic import require_writable
 from derain.files.reading import is_file
 from derain.recordings.odometry import FrameOdometry, Registration
@@ -23,16 +18,13 @@ from derain.recordings.posed import ODOMETRY, with_odometry, with_poses
 from derain.sources.frame import Frame, times_of
 from derain.sources.judging import Guard, unguarded
 from derain.sources.recordings import recordings_of
-from derain.sources.records import POSES
 from derain.sources.source import Frames, Source
-from derain.sources.trajectory import Trajectory, write_trajectory
+from derain.sources.trajectory import write_trajectory
 from derain.system.notices import Notices, warn
 from derain.system.stopwatch import Stopwatch
 
 # Receives the registration of each scan as soon as it is found, and the times of its stages.
 Watch = Callable[[Frame, Registration, Stopwatch], None]
-
-PoseFormat = Literal["kitti", "tum"]
 
 
 @dataclass(frozen=True)
@@ -83,7 +75,6 @@ def find_poses(
     source: Source,
     out: Path,
     *,
-    form: PoseFormat = "kitti",
     replace: bool = False,
     threads: int = 0,
     guard: Guard = unguarded,
@@ -94,9 +85,7 @@ def find_poses(
     Args:
         source: Scans of one recording or more, in time order.
         out: The file of the only recording; of several, a folder with ``<sequence>.txt`` for each.
-        form: Format of a line of a file: ``kitti``, twelve numbers of a matrix, or ``tum``, time,
-            position and quaternion.
-        replace: True if poses that came with the scans may be replaced.
+        replace: True if files that exist may be replaced.
         threads: Threads to use; 0 takes every core.
         guard: Surrounds the reading of each scan; one whose error it holds back is not trusted.
         watch: Receives each registration.
@@ -105,13 +94,12 @@ def find_poses(
         The poses of each recording, in the order of the source.
 
     Raises:
-        InputError: A file that cannot be written, that came with the scans, or that two recordings
-            would share; times that are missing or do not ascend, for ``tum``; a scan that cannot
-            be read, where the guard lets that through.
+        InputError: A file that cannot be written, that exists, or that two recordings would share;
+            a scan that cannot be read, where the guard lets that through.
     """
     recordings = recordings_of(source)
     files = _files_of(recordings, out, replace)
-    times = [_times(recording, form) for recording in recordings]
+    times = [times_of(recording) or [] for recording in recordings]
     odometry = FrameOdometry(threads)
     found = []
     with tqdm(total=len(source), desc=ODOMETRY, unit="scan", disable=None) as bar:
@@ -122,7 +110,7 @@ def find_poses(
                 bar.update()
             poses = FoundPoses(file, recording, registrations, seconds)
             try:
-                _write(poses, form)
+                _write(poses)
             except InputError as error:  # the other recordings go on
                 poses = replaced(poses, fault=error)
             found.append(poses)
@@ -169,7 +157,7 @@ def _register(frame: Frame, odometry: FrameOdometry, guard: Guard, watch: Watch)
     return registration
 
 
-def _write(found: FoundPoses, form: PoseFormat) -> None:
+def _write(found: FoundPoses) -> None:
     registrations = found.registrations
     moves = registrations[1:] or registrations
     if not any(each.trusted for each in moves):
@@ -179,9 +167,7 @@ def _write(found: FoundPoses, form: PoseFormat) -> None:
             f"({moves[0].reason})",
             "Check that they are consecutive, in order of time, and of one sensor.",
         )
-    poses = np.array([each.pose for each in registrations])
-    times = np.array(found.times) if form == "tum" else None
-    write_trajectory(found.file, Trajectory(poses, times))
+    write_trajectory(found.file, np.array([each.pose for each in registrations]))
 
 
 def _files_of(recordings: Sequence[Sequence[Frame]], out: Path, replace: bool) -> list[Path]:
@@ -190,11 +176,10 @@ def _files_of(recordings: Sequence[Sequence[Frame]], out: Path, replace: bool) -
     Args:
         recordings: The recordings.
         out: The file of the only one; of several, a folder with ``<sequence>.txt`` for each.
-        replace: True if poses that came with the scans may be replaced.
+        replace: True if files that exist may be replaced.
 
     Raises:
-        InputError: A file that cannot be written, that came with the scans, or that two recordings
-            would share.
+        InputError: A file that cannot be written, that exists, or that two recordings would share.
     """
     files = [out]
     if len(recordings) > 1:
@@ -207,57 +192,7 @@ def _files_of(recordings: Sequence[Sequence[Frame]], out: Path, replace: bool) -
                 f"would be {file}",
                 "Process them in two runs, each to its --out.",
             )
-        _refuse_to_overwrite(file, recording, replace)
+        if is_file(file) and not replace:
+            raise InputError(file, "exists", "Name another file, or replace it with --replace.")
         require_writable(file)
     return files
-
-
-def _refuse_to_overwrite(file: Path, recording: Sequence[Frame], replace: bool) -> None:
-    target = os.path.realpath(file)
-    for frame in recording:
-        if target in (
-            os.path.realpath(frame.name),
-            os.path.realpath(frame.label_path or frame.name),
-        ):
-            raise InputError(file, "is one of the scans or their labels", "Name another file.")
-    scans = Path(recording[0].name).parent
-    records = [Path(folder, name) for folder in (scans, folder_above(scans)) for name in RECORDS]
-    for record in records:
-        if os.path.realpath(record) != target or not is_file(file):
-            continue
-        if record.name != POSES:
-            raise InputError(file, "came with the scans", "Name another file.")
-        if not replace:
-            raise InputError(
-                file,
-                "holds poses that came with the scans",
-                "Name another file, or replace them with --replace.",
-            )
-
-
-def _times(recording: Sequence[Frame], form: PoseFormat) -> list[float]:
-    """Times of the scans of a recording, seconds; empty if not all of them are known.
-
-    Raises:
-        InputError: Times that are missing or do not ascend, for ``tum``.
-    """
-    times = times_of(recording)
-    if form != "tum":
-        return times or []
-    if times is None:
-        lacking = next(frame for frame in recording if frame.time is None)
-        raise InputError(
-            lacking.name,
-            "its time is not known, and a line of TUM's format begins with the time",
-            "Write a times.txt beside the scans, a line of seconds each, or use --format kitti.",
-        )
-    # Poses are found again by their times, which have to ascend.
-    for (earlier, later), frame in zip(pairwise(times), recording[1:], strict=True):
-        if later <= earlier:
-            raise InputError(
-                frame.name,
-                f"was taken at {later:.3f} s, the scan before it at {earlier:.3f} s, and TUM's "
-                "format requires ascending times",
-                "Name the scans in the order that they were taken in, or use --format kitti.",
-            )
-    return times

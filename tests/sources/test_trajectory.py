@@ -48,24 +48,19 @@ def test_on_the_way_between_two_turns_lies_their_share(start, change, share) -> 
     np.testing.assert_allclose(rotation_of(found), turned(start + share * change), atol=1e-9)
 
 
-@given(poses=st.lists(motions, max_size=5), calibrated=st.booleans(), by_time=st.booleans())
-def test_what_is_written_is_read(tmp_path_factory, poses, calibrated, by_time) -> None:
+@given(poses=st.lists(motions, max_size=5), calibrated=st.booleans())
+def test_what_is_written_is_read(tmp_path_factory, poses, calibrated) -> None:
     folder = tmp_path_factory.mktemp("poses")
     if calibrated:
         numbers = " ".join(map(str, TO_CAMERA[:3].ravel()))
         (folder / "calib.txt").write_text(f"Tr: {numbers}\n")
-    times = 1.7e9 + np.arange(len(poses)) / 10 if by_time else None
-    trajectory = Trajectory(np.array(poses).reshape(-1, 4, 4), times)
-    write_trajectory(folder / "new" / "poses.txt", trajectory)
-    write_trajectory(folder / "poses.txt", trajectory)
+    stacked = np.array(poses).reshape(-1, 4, 4)
     for path in (folder / "new" / "poses.txt", folder / "poses.txt"):
-        found = read_trajectory(path)
-        np.testing.assert_allclose(found.poses, trajectory.poses, atol=1e-6)
-        if by_time and poses:
-            np.testing.assert_allclose(found.times, times, atol=1e-6)
+        write_trajectory(path, stacked)
+        np.testing.assert_allclose(read_trajectory(path).poses, stacked, atol=1e-6)
     lines = (folder / "poses.txt").read_text().splitlines()
-    assert {len(line.split()) for line in lines} <= {8 if by_time else 12}
-    if calibrated and poses and not by_time:  # they are the camera's
+    assert {len(line.split()) for line in lines} <= {12}
+    if calibrated and poses:  # they are the camera's
         camera = np.array(lines[0].split(), float).reshape(3, 4)
         expected = TO_CAMERA @ poses[0] @ np.linalg.inv(TO_CAMERA)
         np.testing.assert_allclose(camera, expected[:3], atol=1e-6)
@@ -132,6 +127,6 @@ def test_nothing_half_written_is_left(tmp_path) -> None:
     path.write_text("as it was")
     (tmp_path / "calib.txt").write_text("damaged")
     with pytest.raises(InputError, match="has no line Tr"):
-        write_trajectory(path, Trajectory(np.eye(4)[None]))
+        write_trajectory(path, np.eye(4)[None])
     assert path.read_text() == "as it was"
     assert {file.name for file in tmp_path.iterdir()} == {"poses.txt", "calib.txt"}
