@@ -8,7 +8,8 @@ from rerun.chunk import RrdReader
 from derain.pictures.entities import FRAME, TIME
 from derain.scan import Float32s
 
-POSITIONS = "Points3D:positions"
+POSITIONS, CLEAR = "Points3D:positions", "Clear:is_recursive"
+ROW = "rerun.controls.RowId"
 
 
 class ReadBack:
@@ -25,6 +26,7 @@ class ReadBack:
         reader = RrdReader(path)
         self.blueprints = len(reader.blueprints())
         self._values: dict[tuple[str, str], dict[int | None, Any]] = {}
+        self._rows: dict[tuple[str, str], dict[int | None, bytes]] = {}
         self.timelines: set[str] = set()
         self.seconds: dict[int, float] = {}
         for chunk in reader.stream():
@@ -47,7 +49,11 @@ class ReadBack:
 
     def cleared(self, entity: str) -> set[int | None]:
         """At which scans an entity is emptied."""
-        return set(self.values(entity, "Clear:is_recursive"))
+        return set(self.values(entity, CLEAR))
+
+    def rows(self, entity: str, component: str) -> dict[int | None, bytes]:
+        """Row of a component by the number of the scan; of one number, the later row counts."""
+        return self._rows.get((entity, component), {})
 
     def _take(self, entity: str, batch: Any) -> None:
         named = {name: batch.column(name) for name in batch.schema.names}
@@ -60,3 +66,4 @@ class ReadBack:
                 if ":" in name and column[row].is_valid:
                     value = column[row].values if name == POSITIONS else column[row].as_py()
                     self._values.setdefault((entity, name), {})[number] = value
+                    self._rows.setdefault((entity, name), {})[number] = named[ROW][row].as_py()

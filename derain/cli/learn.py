@@ -124,10 +124,8 @@ def _write_playback(config: LearnConfig, out: Path) -> None:
     from derain.sources.spread import evenly_spaced
 
     data = Taught(str(config.taught))
-    held_out = data.frames("validation")
-    every = [*data.frames("train"), *held_out]
+    every = [*data.frames("train"), *data.frames("validation")]
     frames = sorted(every, key=lambda frame: (frame.sequence, frame.number))
-    shown = evenly_spaced(range(len(frames)), MOST_SHOWN)
-    selection = Selection(Frames(frames), shown, frozenset(frame.key for frame in held_out))
+    selection = Selection(Frames(frames), evenly_spaced(range(len(frames)), MOST_SHOWN))
     methods: dict[str, Method] = {"student": Derainer(config.out)}
     write_and_report(out, selection, methods, Labels(data.card, "teacher"))

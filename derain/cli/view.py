@@ -18,10 +18,10 @@ the data card of the labels; without it no truth is shown. Pictures leave out po
 unknown.
 Of a bag, the first cloud is drawn unless the path names another.
 It needs derain[view]; --window also needs derain[scene].
---rerun writes the scans, and for each method the points it keeps, the points it removes and the
-probability of rain; range images; the share removed from each scan, and with --card its IoU. With
-poses, from files beside the scans or by --poses, the scans are placed in the world. Scans that
-cannot be read or judged are reported and shown empty; the exit code is then 2.
+--rerun writes the scans and their range images, and for each method the points it keeps, the points
+it removes, the probability of rain, and the share removed from each scan. With poses, from files
+beside the scans or by --poses, the scans are placed in the world. Scans that cannot be read or
+judged are reported and shown empty; the exit code is then 2.
 """
 
 import argparse

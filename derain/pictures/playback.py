@@ -1,6 +1,5 @@
 """Writes a recording for Rerun's viewer: scans over time, their labels, and what methods find."""
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +9,6 @@ import rerun
 from tqdm import tqdm
 
 from derain.errors import InputError, printable
-from derain.evaluation.counts import Counts, ratio
 from derain.pictures import entities, palette
 from derain.pictures.entities import MethodEntities
 from derain.pictures.playback_layout import layout, write_static
@@ -60,33 +58,28 @@ def write_playback(
     name = printable(first.sequence or Path(first.name).name)
     opened_with = layout(methods, labels, placed=bool(selection.poses))
     with recording_file(path, name, opened_with) as file:
-        write_static(file, selection, labels, methods)
+        write_static(file, labels, methods)
         writer = PlaybackWriter(file, selection, labels)
         _write_scans(writer, selection, guard)
         for title, method in methods.items():
-            missing = {frame.key: frame for frame in selection.frames}
+            for frame in selection.frames:
+                writer.begin(frame, MethodEntities(title).all)
             frames = tqdm(selection.for_method(method), title, unit="scan", disable=None)
             for frame, judgement, _ in judgements(method, frames, guard):
-                if frame.key in missing:
+                if frame.key in selection.number_of:
                     with guard(frame):
                         writer.write_judgement(title, method, judgement)
                         watch(title, judgement)
-                        del missing[frame.key]
                     file.flush()
-            for frame in missing.values():
-                place = MethodEntities(title)
-                writer.clear(frame, place.all, place.image, place.share, place.iou)
 
 
 def _write_scans(writer: "PlaybackWriter", selection: Selection, guard: Guard) -> None:
-    written = 0
+    written = False
     for frame in tqdm(selection.frames, "scans", unit="scan", disable=None):
-        before = written
+        writer.begin(frame, entities.SCAN, entities.RANGES, entities.CAPTION)
         with guard(frame):
             writer.write_scan(frame)
-            written += 1
-        if written == before:
-            writer.clear(frame, entities.SCAN, entities.RANGES, entities.CAPTION)
+            written = True
         writer.file.flush()
     if not written:
         first = selection.frames[0]
@@ -107,17 +100,24 @@ class PlaybackWriter:
     selection: Selection
     labels: Labels | None
 
+    def begin(self, frame: Frame, *paths: str) -> None:
+        """Clears entities at a frame, so that what the frame before has there does not stay.
+
+        What is logged at the frame afterwards is shown.
+        """
+        self._set_time(frame)
+        for path in paths:
+            self.file.log(path, rerun.Clear(recursive=True))
+
     def write_scan(self, frame: Frame) -> None:
-        """Writes a scan with its pose and its labels.
+        """Writes a scan with its pose and its labels, for a frame that has begun.
 
         Raises:
             InputError: A scan or labels that cannot be read.
         """
         scan = frame.read()
         labelled = None if self.labels is None else self.labels.of(frame, scan)
-        self._set_time(frame)
-        by = None if labelled is None else self.labels
-        text = caption(frame, scan, by, frame.key in self.selection.held_out)
+        text = caption(frame, scan, None if labelled is None else self.labels)
         self.file.log(entities.CAPTION, rerun.TextDocument(text, media_type="text/markdown"))
         if frame.key in self.selection.poses:
             pose = self.selection.poses[frame.key]
@@ -132,7 +132,7 @@ class PlaybackWriter:
                 ranges, meter=PER_METRE, colormap="grayscale", depth_range=span
             )
             self.file.log(entities.RANGES, image)
-        if self.labels is not None:
+        if self.labels is not None and labelled is not None:
             self._write_labels(self.labels, scan, labelled)
 
     def write_judgement(self, title: str, method: Method, judgement: Judgement) -> None:
@@ -152,70 +152,27 @@ class PlaybackWriter:
         labelled = None if self.labels is None else self.labels.of(frame, scan)
         # Where the truth is not known, what was called rain counts as rain.
         truth = rain if labelled is None else np.where(labelled.known, labelled.rain, rain)
-        outcome = palette.outcomes(rain, truth)
-        classed = (outcome + entities.CLASS_KEPT).astype(np.uint16)
+        classed = palette.outcomes(rain, truth).astype(np.uint16)
         self._set_time(frame)
         for entity, rows in ((place.kept, scan.valid & ~rain), (place.removed, rain)):
             self.file.log(entity, rerun.Points3D(scan.xyz[rows], class_ids=classed[rows]))
-        if self.labels is not None:
-            self._write_errors(place, judgement, labelled)
         if method.gives_probabilities:
             rows = judgement.probability >= LEAST_PROBABILITY
             colours = palette.shades(palette.PROBABILITY, judgement.probability[rows])
             self.file.log(place.probability, rerun.Points3D(scan.xyz[rows], colors=colours))
-        if (view := self.selection.look.view) is not None:
-            winner = view(scan).winner
-            kept = classed == entities.CLASS_KEPT
-            coloured = np.append(np.where(kept, entities.NOTHING, classed), entities.NOTHING)
-            image = coloured[winner].reshape(view.grid.rows, -1)
-            self.file.log(place.image, rerun.SegmentationImage(image.astype(np.uint8)))
         self._write_share(place.share, rain, scan)
 
-    def clear(self, frame: Frame, *paths: str) -> None:
-        """Clears entities at a frame, so that what the frame before has there does not stay."""
-        self._set_time(frame)
-        self._clear(*paths)
-
-    def _write_labels(self, labels: Labels, scan: Scan, found: LabelledRain | None) -> None:
-        if found is None:
-            self._clear(labels.points, labels.share, labels.share_not_known)
-            return
+    def _write_labels(self, labels: Labels, scan: Scan, found: LabelledRain) -> None:
         shown = scan.valid & (found.rain | ~found.known)
         classed = np.where(found.rain[shown], entities.CLASS_RAIN, entities.CLASS_NOT_KNOWN)
         points = rerun.Points3D(scan.xyz[shown], class_ids=classed.astype(np.uint16))
         self.file.log(labels.points, points)
         self._write_share(labels.share, found.rain, scan)
-        if labels.card.unknown:
-            self._write_share(labels.share_not_known, ~found.known, scan)
-
-    def _write_errors(
-        self, place: MethodEntities, judgement: Judgement, found: LabelledRain | None
-    ) -> None:
-        """Writes the rain that a method keeps, which is drawn large, and its IoU."""
-        if found is None:
-            self._clear(place.missed, place.iou)
-            return
-        scan, rain = judgement.scan, judgement.rain
-        judged = scan.valid & found.known
-        missed = scan.xyz[judged & found.rain & ~rain]
-        self.file.log(place.missed, rerun.Points3D(missed, class_ids=entities.CLASS_MISSED))
-        self._write_number(place.iou, Counts.of(rain[judged], found.rain[judged]).iou)
 
     def _write_share(self, entity: str, part: Bools, scan: Scan) -> None:
         """Writes the share of the valid points, per cent, that a part of them is."""
-        whole = np.count_nonzero(scan.valid)
-        self._write_number(entity, 100 * float(ratio(np.count_nonzero(part & scan.valid), whole)))
-
-    def _write_number(self, entity: str, value: float) -> None:
-        """Writes a number of a curve; where it is undefined, the curve has a gap."""
-        if math.isnan(value):
-            self._clear(entity)
-        else:
-            self.file.log(entity, rerun.Scalars(value))
-
-    def _clear(self, *entities: str) -> None:
-        for entity in entities:
-            self.file.log(entity, rerun.Clear(recursive=True))
+        if scan.valid.any():
+            self.file.log(entity, rerun.Scalars(100 * np.mean(part[scan.valid])))
 
     def _set_time(self, frame: Frame) -> None:
         """Dates all that is logged from here on to a frame."""
@@ -226,16 +183,15 @@ class PlaybackWriter:
             stream.set_time(entities.TIME, duration=seconds)
 
 
-def caption(frame: Frame, scan: Scan, labels: Labels | None, held_out: bool) -> str:
+def caption(frame: Frame, scan: Scan, labels: Labels | None) -> str:
     """Text beside a scan, in Markdown: which scan it is, and what the colours mean.
 
     Args:
         frame: The frame.
         scan: Its scan.
         labels: The labels that its rain is known by; None where it has none.
-        held_out: True if a model was trained, and not on this scan.
     """
-    which = f"**{_escaped(frame.key)}**, {len(scan):,} points" + ", held out" * held_out
+    which = f"**{_escaped(frame.key)}**, {len(scan):,} points"
     coloured = palette.OUTCOMES if labels else palette.WITHOUT_LABELS
     meanings = "\n".join(
         f"- {COLOUR_NAMES[colour]}: {meaning}" for meaning, colour in coloured.items()

@@ -1,4 +1,4 @@
-"""The layout of a recording in the viewer: scans side by side by method, range images, curves."""
+"""The layout of a recording in the viewer: scans side by side by method, range image, curves."""
 
 from collections.abc import Mapping, Sequence
 
@@ -10,7 +10,7 @@ from derain.pictures import entities, palette
 from derain.pictures.entities import MethodEntities
 from derain.pictures.palette import rgb
 from derain.pictures.recording_file import RecordingFile
-from derain.pictures.selection import Labels, Selection
+from derain.pictures.selection import Labels
 from derain.sources.method import Method
 
 # Where the viewer's eye is, and the point that it looks at, metres: from behind and above.
@@ -32,8 +32,14 @@ def layout(methods: Mapping[str, Method], labels: Labels | None, placed: bool) -
     return Blueprint(
         views.Vertical(
             _clouds(methods, labels, placed),
-            _images(methods),
-            _curves(labels),
+            views.Spatial2DView(
+                origin=entities.RANGES, name="Range image", background=rgb(palette.BACKGROUND)
+            ),
+            views.Horizontal(
+                views.TimeSeriesView(origin=entities.SHARE, name="Share of the points, %"),
+                views.TextDocumentView(origin=entities.CAPTION, name="Scan"),
+                column_shares=[3, 1],
+            ),
             row_shares=[5.5, 1.3, 2.6],
         ),
         # It stays at the first scan until somebody presses play.
@@ -48,18 +54,17 @@ def layout(methods: Mapping[str, Method], labels: Labels | None, placed: bool) -
 
 
 def _clouds(methods: Mapping[str, Method], labels: Labels | None, placed: bool) -> views.Tabs:
-    """The point clouds: tabs of what is removed, kept, and probable, the methods side by side."""
+    """The point clouds: tabs of what is removed and what is probable, the methods side by side."""
     scan = [entities.POINTS] if labels is None else [entities.POINTS, labels.points]
     first = "scan" if labels is None else f"scan and {labels.name}"
     places = {title: MethodEntities(title) for title in methods}
-    removed = [_cloud(title, [m.kept, m.removed, m.missed], placed) for title, m in places.items()]
-    cleaned = [_cloud(f"{title}: kept", [m.kept, m.missed], placed) for title, m in places.items()]
+    removed = [_cloud(title, [m.kept, m.removed], placed) for title, m in places.items()]
     probability = [
         _cloud(f"{title}: probability", [entities.POINTS, m.probability], placed, dark=True)
         for title, m in places.items()
         if methods[title].gives_probabilities
     ]
-    tabs = {"Removed": removed, "Cleaned": cleaned, "Probability": probability}
+    tabs = {"Removed": removed, "Probability": probability}
     return views.Tabs(
         *(
             views.Horizontal(_cloud(first, scan, placed), *of_methods, name=name)
@@ -77,7 +82,7 @@ def _cloud(
     shade = rerun.Points3D.from_fields(colors=rgb(palette.PROBABILITY[0]))
     return views.Spatial3DView(
         origin="/",
-        contents=[f"+ {path}" for path in (*paths, entities.TRAJECTORY)],
+        contents=[f"+ {path}" for path in paths],
         name=name,
         background=rgb(palette.BACKGROUND),
         overrides={entities.POINTS: shade} if dark else None,
@@ -91,66 +96,24 @@ def _cloud(
     )
 
 
-def _images(methods: Mapping[str, Method]) -> views.Tabs:
-    """The range image, and over it the result of each method."""
-    shown = {f"{title}: range image": [MethodEntities(title).image] for title in methods}
-    shown["range image"] = []
-    return views.Tabs(
-        *(
-            views.Spatial2DView(
-                origin=entities.RANGE_IMAGE,
-                contents=[f"+ {path}" for path in (entities.RANGES, *results)],
-                name=name,
-                background=rgb(palette.BACKGROUND),
-            )
-            for name, results in shown.items()
-        ),
-        active_tab=0,
-    )
-
-
-def _curves(labels: Labels | None) -> views.Horizontal:
-    """Numbers over the scans, and the text of the scan."""
-    shares = _curve(entities.SHARE, "Share of the points, %", legend=True)
-    text = views.TextDocumentView(origin=entities.CAPTION, name="Scan")
-    if labels is None:
-        return views.Horizontal(shares, text, column_shares=[3, 1])
-    # Its lines have the colours of the shares.
-    iou = _curve(entities.IOU, f"IoU with the {labels.name}", legend=False)
-    return views.Horizontal(shares, iou, text, column_shares=[3, 3, 2])
-
-
-def _curve(origin: str, name: str, *, legend: bool) -> views.TimeSeriesView:
-    shown = views.PlotLegend(visible=legend)
-    return views.TimeSeriesView(origin=origin, name=name, plot_legend=shown)
-
-
-def write_static(
-    file: RecordingFile, selection: Selection, labels: Labels | None, methods: Mapping[str, Method]
-) -> None:
-    """Writes what holds for the whole recording: colours, sizes, names, the sensor's path.
+def write_static(file: RecordingFile, labels: Labels | None, methods: Mapping[str, Method]) -> None:
+    """Writes what holds for the whole recording: colours, sizes, names.
 
     Args:
         file: The file to write to.
-        selection: The scans shown.
         labels: Labels of the scans, where they have some.
         methods: The methods by their titles.
     """
     file.log("/", rerun.ViewCoordinates.FLU, entities.classes(), static=True)
     _sized(file, SMALL, [entities.POINTS])
-    if selection.paths:
-        path = rerun.LineStrips3D(selection.paths, colors=rgb(palette.SOLID), radii=LARGE)
-        file.log(entities.TRAJECTORY, path, static=True)
     if labels is not None:
         _sized(file, LARGE, [labels.points])
         _line(file, labels.share, labels.name, palette.SOLID)
-        _line(file, labels.share_not_known, f"not known to the {labels.name}", palette.MISSED)
     for number, title in enumerate(methods):
         place = MethodEntities(title)
         _sized(file, SMALL, [place.kept])
-        _sized(file, LARGE, [place.removed, place.missed, place.probability])
-        for line in (place.share, place.iou):
-            _line(file, line, title, palette.LINES[number % len(palette.LINES)])
+        _sized(file, LARGE, [place.removed, place.probability])
+        _line(file, place.share, title, palette.LINES[number % len(palette.LINES)])
 
 
 def _sized(file: RecordingFile, size: float, paths: Sequence[str]) -> None:

@@ -42,7 +42,6 @@ class Selection:
     Attributes:
         source: All scans.
         numbers: The places of the scans shown, ascending.
-        held_out: Keys of scans that a model was not trained on, where one was trained.
 
     Raises:
         InputError: No scan is shown.
@@ -50,7 +49,6 @@ class Selection:
 
     source: Source
     numbers: Sequence[int]
-    held_out: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         if not self.numbers:
@@ -115,15 +113,6 @@ class Selection:
     def look(self) -> "SensorLook":
         """The scale and view in which the scans are drawn."""
         return SensorLook.of(self.frames)
-
-    @cached_property
-    def paths(self) -> list[Float32s]:
-        """The sensor's path in each sequence, float32 (scans, 3), metres."""
-        paths: dict[str, list[Floats]] = {}
-        for frame in self.frames:
-            if frame.key in self.poses:
-                paths.setdefault(frame.sequence, []).append(self.poses[frame.key][:3, 3])
-        return [np.array(path, np.float32) for path in paths.values()]
 
 
 @dataclass(frozen=True)
@@ -208,11 +197,6 @@ class Labels:
     def share(self) -> str:
         """Entity of the share of rain in the points, per cent."""
         return f"{SHARE}/scan/{self.name}"
-
-    @property
-    def share_not_known(self) -> str:
-        """Entity of the share of points whose label is unknown, per cent."""
-        return f"{self.share}_not_known"
 
     def of(self, frame: Frame, scan: Scan) -> LabelledRain | None:
         """The labels of a scan; None where it has none.
