@@ -6,7 +6,15 @@ from dataclasses import astuple, dataclass, field
 import numpy as np
 
 from derain.cards.card import DataCard
-from derain.evaluation.counts import Counts, RainCounts, band_names, band_of, ratio, table_of
+from derain.evaluation.counts import (
+    RANGE_EDGES,
+    Counts,
+    RainCounts,
+    band_names,
+    band_of,
+    ratio,
+    table_of,
+)
 from derain.evaluation.text_tables import number_text, plain_table
 from derain.scan import Bools, Floats, Ints, Scan
 from derain.sources.frame import Frame
@@ -17,10 +25,7 @@ from derain.views.morton import first_rows
 NOT_RAIN, RAIN, NOT_KNOWN = range(3)
 TEACHERS_ANSWERS = {NOT_RAIN: "not rain", RAIN: "rain", NOT_KNOWN: "not known"}
 
-# Where the narrow bands start in which answers are counted, metres; the last is open.
-FINE_EDGES = tuple(range(0, 85, 5))
-
-_SHAPE = (len(FINE_EDGES), len(TEACHERS_ANSWERS), 2)
+_SHAPE = (len(RANGE_EDGES), len(TEACHERS_ANSWERS), 2)
 
 # What a teacher's answers are measured on.
 OF_TEACHER = ("all points", "points it is sure of")
@@ -45,9 +50,9 @@ class Answers:
     """Points by range, by the teacher's answer and by the student's.
 
     Attributes:
-        table: Points, int64 (bands of ``FINE_EDGES``, answers of the teacher, 2); of the last axis
-            the second counts what the student calls rain. Without a student, all are in the first.
-            By default there are none.
+        table: Points, int64 (bands of ``RANGE_EDGES``, answers of the teacher, 2); of the last
+            axis the second counts what the student calls rain. Without a student, all are in the
+            first. By default there are none.
     """
 
     table: Ints = field(default_factory=lambda: np.zeros(_SHAPE, np.int64))
@@ -67,7 +72,7 @@ class Answers:
         answer = answer_of(scan, card)
         student = np.zeros(len(scan), np.int64) if called_rain is None else called_rain
         valid = scan.valid
-        band = band_of(scan.range[valid], FINE_EDGES)
+        band = band_of(scan.range[valid])
         return cls(table_of((band, answer[valid], student[valid].astype(np.int64)), _SHAPE))
 
     def __add__(self, other: "Answers") -> "Answers":
@@ -111,35 +116,18 @@ class Answers:
             true_negative=int(kept[NOT_RAIN]),
         )
 
+    @property
+    def by_range(self) -> dict[str, "Answers"]:
+        """The answers in each band of ``RANGE_EDGES``, by its name."""
+        return {name: Answers(self.table[[band]]) for band, name in enumerate(band_names())}
+
     def __str__(self) -> str:
         """Points and the shares of the teacher's answers, by range, as a table."""
         rows = [["range", "points", *TEACHERS_ANSWERS.values()]]
-        for name, band in {**coarse_bands(self), "all": self}.items():
+        for name, band in {**self.by_range, "all": self}.items():
             shares = (number_text(share, ".1%") for share in band.shares)
             rows.append([name, f"{band.points:,}", *shares])
         return plain_table(rows)
-
-
-@dataclass(frozen=True)
-class AnswersOfScan:
-    """The answers of one scan.
-
-    Attributes:
-        held_out: True if the student did not learn from it, but is chosen and measured by it.
-        answers: The answers.
-    """
-
-    held_out: bool
-    answers: Answers
-
-
-def coarse_bands(answers: Answers) -> dict[str, Answers]:
-    """The answers in each band of ``RANGE_EDGES``, by its name."""
-    wide = band_of(np.array(FINE_EDGES))
-    return {
-        name: Answers(np.where((wide == band)[:, None, None], answers.table, 0))
-        for band, name in enumerate(band_names())
-    }
 
 
 class TruthRecord:

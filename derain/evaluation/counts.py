@@ -58,16 +58,15 @@ def band_names() -> list[str]:
     return [*names, f"{RANGE_EDGES[-1]}+ m"]
 
 
-def band_of(range: NDArray[np.floating], edges: Sequence[float] = RANGE_EDGES) -> Ints:
-    """Number of each point's band, int64 (N,).
+def band_of(range: NDArray[np.floating]) -> Ints:
+    """Number of each point's band of ``RANGE_EDGES``, int64 (N,).
 
     Args:
         range: Distance from the sensor, metres, (N,). Values that are not finite belong to the
             last band.
-        edges: Starts of the bands, metres, rising from 0.
     """
     finite_or_far = np.where(np.isfinite(range), range, np.inf)
-    return np.searchsorted(edges[1:], finite_or_far, side="right").astype(np.int64)
+    return np.searchsorted(RANGE_EDGES[1:], finite_or_far, side="right").astype(np.int64)
 
 
 @dataclass(frozen=True)

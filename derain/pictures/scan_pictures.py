@@ -201,27 +201,21 @@ def draw_columns(
 
     Args:
         columns: Axes of the panels, (K, 2); those of the first column are labelled.
-        panels: Title, scan and outcomes of each column, as for :func:`draw_from_above`.
+        panels: Title, scan and outcomes of each column: of each point a number of ``OUTCOMES``,
+            int64 (N,); None shows intensity where it was measured.
         fontsize: Size of the titles, as matplotlib takes it.
     """
     for (above, ahead), (title, scan, outcome) in zip(columns, panels, strict=True):
         above.set_title(title, fontsize=fontsize)
-        draw_from_above(above, scan, outcome)
+        _draw_from_above(above, scan, outcome)
         _draw_as_seen(ahead, scan, outcome)
     above, ahead = columns[0]
     above.set(ylabel="forward / m", xlabel="right / m")
     ahead.set(ylabel="inclination / °", xlabel="azimuth, to the right / °")
 
 
-def draw_from_above(axes: Axes, scan: Scan, outcome: Ints | None) -> None:
-    """Draws a scan from above, in metres, forward being up; most points are within the limits.
-
-    Args:
-        axes: The axes to draw in.
-        scan: The scan; invalid points are not drawn.
-        outcome: Outcome of each point, as a number of ``OUTCOMES``, int64 (N,); None shows
-            intensity where it was measured.
-    """
+def _draw_from_above(axes: Axes, scan: Scan, outcome: Ints | None) -> None:
+    """Draws a scan from above, in metres, forward being up; most points are within the limits."""
     seen = scan.valid
     x, y, _ = scan.xyz[seen].T
     scatter(axes, -y, x, *_colours(scan, outcome, seen))

@@ -12,17 +12,9 @@ from derain.cards.card import DataCard, load_card
 from derain.cards.known import label_of, layouts_for
 from derain.datamodules.taught import Taught
 from derain.errors import InputError
-from derain.evaluation.answers import (
-    NOT_KNOWN,
-    RAIN,
-    Answers,
-    AnswersOfScan,
-    TruthRecord,
-    answer_of,
-)
+from derain.evaluation.answers import NOT_KNOWN, RAIN, Answers, TruthRecord, answer_of
 from derain.evaluation.counts import SCORES
 from derain.evaluation.text_tables import markdown_table, number_text
-from derain.pictures.answers import answers_figure
 from derain.pictures.scan_pictures import before_after_figure, save
 from derain.recordings.persistence import PersistenceDerainer
 from derain.scan import Bools, Scan
@@ -38,28 +30,11 @@ from derain.workflows.learn_report import LearnResults
 # Returns which points of a scan of N points are rain, bool (N,).
 Student = Callable[[Scan], Bools]
 
-# Scans counted of a long recording, held-out scans measured, and of these drawn.
-MOST_COUNTED = 300
+# Held-out scans measured, and of these drawn.
 MOST_EVALUATED = 50
 DRAWN = 3
 
 SURE = "teacher, where it is sure"
-
-
-def teacher_answers(data: Taught) -> list[AnswersOfScan]:
-    """The teacher's answers, scan by scan in time order; of a long recording, of a part of it.
-
-    Raises:
-        InputError: A scan that cannot be read.
-    """
-    held_out = evenly_spaced(data.frames("validation"), MOST_EVALUATED)
-    frames = [*evenly_spaced(data.frames("train"), MOST_COUNTED), *held_out]
-    frames.sort(key=lambda frame: (frame.sequence, frame.number))
-    keys = {frame.key for frame in held_out}
-    return [
-        AnswersOfScan(frame.key in keys, _answers(data, frame))
-        for frame in tqdm(frames, "counting", disable=None)
-    ]
 
 
 def beside_persistence(data: Taught, recording: Source) -> Answers:
@@ -108,33 +83,18 @@ def evaluate_student(
         InputError: A scan that cannot be read, or a picture that cannot be written.
     """
     frames = evenly_spaced(data.frames("validation"), MOST_EVALUATED)
-    results.evaluated = [
-        AnswersOfScan(True, _answers(data, frame, student))
-        for frame in tqdm(frames, "evaluating", disable=None)
-    ]
+    results.agreement = Answers()
+    for frame in tqdm(frames, "evaluating", disable=None):
+        scan = data.read_measured(frame)
+        results.agreement += Answers.of(scan, data.card, student(scan))
     for number, frame in enumerate(evenly_spaced(data.frames("validation"), DRAWN), 1):
-        _draw(results, data, frame, student, f"held_out_{number}")
+        scan = data.read(frame)
+        picture = results.path.with_name(f"held_out_{number}.png")
+        heading = f"{frame.key}, held out: cleaned by {results.student}"
+        save(before_after_figure(scan, student(scan), heading), picture)
+        results.pictures[picture] = f"{frame.key} before and after"
     if card is not None:
         results.record = scores_by_labels(frames, data.card, card, student)
-
-
-def _answers(data: Taught, frame: Frame, student: Student | None = None) -> Answers:
-    scan = data.read_measured(frame)
-    return Answers.of(scan, data.card, None if student is None else student(scan))
-
-
-def _draw(results: LearnResults, data: Taught, frame: Frame, student: Student, name: str) -> None:
-    """Draws a held-out scan before and after, and the student beside the teacher."""
-    scan = data.read(frame)
-    rain = student(scan)
-    before_after = results.path.with_name(f"{name}.png")
-    heading = f"{frame.key}, held out: cleaned by {results.student}"
-    save(before_after_figure(scan, rain, heading), before_after)
-    results.pictures[before_after] = f"{frame.key} before and after"
-    beside = results.path.with_name(f"{name}_beside.png")
-    heading = f"{frame.key}: {results.teacher} and {results.student}"
-    save(answers_figure(scan, data.card, rain, heading), beside)
-    results.pictures[beside] = f"{frame.key}: teacher and student"
 
 
 def scores_by_labels(frames: Sequence[Frame], taught: DataCard, name: str, student: Student) -> str:

@@ -23,13 +23,13 @@ from derain.sources.records import POSES
 from derain.sources.source import Source
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import recorded_warnings, warn
-from derain.workflows.evaluation import beside_persistence, evaluate_student, teacher_answers
+from derain.workflows.evaluation import beside_persistence, evaluate_student
 from derain.workflows.fit import fit, fit_options
 from derain.workflows.learn_config import PERSISTENCE, LearnConfig, Student, student_of
 from derain.workflows.learn_report import LEAST_RAIN, LearnResults, write_report
 from derain.workflows.odometry import find_poses, placed
 from derain.workflows.progress import Show, Steps, show_nothing
-from derain.workflows.teaching import teach_recordings
+from derain.workflows.teaching import TeachResults, teach_recordings
 
 # A folder with this file may be cleared by a second run.
 MARK = "learning.txt"
@@ -86,7 +86,7 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
             config.recordings, config.columns, labelled=True, recordings=True, topic=config.topic
         )
         recording = placed(found, poses)
-        _teach(config, teacher, recording, steps, warnings)
+        taught = _teach(config, teacher, recording, steps, warnings)
         data = Taught(str(config.taught))
         # Scans suit persistence, another teacher, where this one sees several at a time.
         is_compared = config.teacher != PERSISTENCE and not teacher.window.is_one_scan
@@ -96,7 +96,9 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
             student=str(student),
             model=config.out,
             path=config.work / "report.md",
-            scans=teacher_answers(data),
+            taught=taught.answers,
+            trained_on=len(taught.manifest.scans) - taught.held_out,
+            held_out=taught.held_out,
             persistence=beside_persistence(data, recording) if is_compared else None,
             stood=config.poses == STANDING,
             sees_intensity=student.sees_unit,
@@ -202,7 +204,7 @@ def _find_poses(config: LearnConfig, source: Source, steps: Steps) -> str | None
 
 def _teach(
     config: LearnConfig, teacher: Method, recording: Source, steps: Steps, warnings: Sequence[str]
-) -> None:
+) -> TeachResults:
     """Has the teacher label the scans.
 
     Raises:
@@ -220,6 +222,7 @@ def _teach(
             "Record scans that overlap.",
         )
     steps.end(f"{labelled:,} scans labelled")
+    return results
 
 
 def _refuse_clean(results: LearnResults) -> None:

@@ -1,14 +1,12 @@
 """The report on a network that a teacher has taught: how far to trust it, and when not to."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from derain.evaluation.answers import Answers, AnswersOfScan, coarse_bands
+from derain.evaluation.answers import Answers
 from derain.evaluation.text_tables import markdown_table, number_text
 from derain.files.atomic import write_text
-from derain.pictures.answers import removed_figure, teacher_figure
-from derain.pictures.scan_pictures import save
 
 # Shares of rain among the points that a teacher is sure of. Less than a thousandth of a scan is
 # what a few moving things make of clean air. Of simulated dry streets persistence calls up to .7 %
@@ -29,8 +27,8 @@ ALWAYS = """\
 - The held-out scans are of the same drive as those that the student learnt from. They do
   not measure another sensor, another mounting, heavier rain or another kind of rain.
 - Agreement is not truth: the student also learns errors that the teacher repeats, such as on cars
-  that move as it does, and the agreement does not show them. The pictures do: look for red and blue
-  on things.
+  that move as it does, and the agreement does not show them. The pictures do: look for blue on
+  things.
 - Run the model on a recording in dry air, and check that it removes nothing: `derain run` prints
   the share."""
 
@@ -55,8 +53,11 @@ class LearnResults:
         student: Name of the network, and what it sees.
         model: The ONNX file.
         path: File of the report.
-        scans: The teacher's answers, scan by scan in time order.
-        evaluated: The student's answers beside them on held-out scans; none before it is trained.
+        taught: The teacher's answers of all scans.
+        trained_on: Number of scans that the student learns from.
+        held_out: Number of scans that are held out.
+        agreement: The student's answers beside the teacher's on held-out scans; of no point before
+            it is trained.
         persistence: Persistence's answers on held-out scans, and beside them what the teacher calls
             rain; None where they are not compared.
         stood: True if the sensor was at rest, by the configuration.
@@ -72,8 +73,10 @@ class LearnResults:
     student: str
     model: Path
     path: Path
-    scans: Sequence[AnswersOfScan]
-    evaluated: Sequence[AnswersOfScan] = ()
+    taught: Answers
+    trained_on: int
+    held_out: int
+    agreement: Answers = field(default_factory=Answers)
     persistence: Answers | None = None
     stood: bool = False
     sees_intensity: bool = True
@@ -82,29 +85,15 @@ class LearnResults:
     record: str = ""
     commands: Sequence[str] = ()
 
-    @property
-    def taught(self) -> Answers:
-        """The teacher's answers of all scans."""
-        return sum((scan.answers for scan in self.scans), Answers())
-
-    @property
-    def agreement(self) -> Answers:
-        """The student's answers beside the teacher's, of the held-out scans."""
-        return sum((scan.answers for scan in self.evaluated), Answers())
-
-    @property
-    def trained_on(self) -> int:
-        """Number of scans that the student learns from."""
-        return sum(not scan.held_out for scan in self.scans)
-
     def __str__(self) -> str:
         """Two or three sentences."""
         _, rain, unknown = self.taught.shares
         text = (
-            f"{self.teacher} labels {len(self.scans):,} scans: {number_text(rain, '.1%')} of the "
-            f"points are rain, {number_text(unknown, '.1%')} are not known."
+            f"{self.teacher} labels {self.trained_on + self.held_out:,} scans: "
+            f"{number_text(rain, '.1%')} of the points are rain, {number_text(unknown, '.1%')} are "
+            "not known."
         )
-        if self.evaluated:
+        if self.agreement.points:
             iou, removed = self.agreement.agreement.iou, self.agreement.removed
             text += (
                 f" On held-out scans {self.student} agrees with it to an IoU of "
@@ -115,31 +104,22 @@ class LearnResults:
 
 
 def write_report(results: LearnResults) -> None:
-    """Writes the report, with pictures of all scans together.
+    """Writes the report.
 
     Raises:
         InputError: An output that cannot be written.
     """
-    teacher = results.path.with_name("teacher.png")
-    save(teacher_figure(results.scans, f"Labels of {results.teacher}"), teacher)
-    results.pictures[teacher] = "shares of rain, not rain and not known"
-    if results.evaluated:
-        removed = results.path.with_name("removed.png")
-        title = "Removed from held-out scans, by range"
-        save(removed_figure(results.agreement, title), removed)
-        results.pictures[removed] = "share removed by range"
     write_text(results.path, as_markdown(results))
 
 
 def as_markdown(results: LearnResults) -> str:
     """The text of the report."""
-    held_out = len(results.scans) - results.trained_on
     parts = [
         f"# Learning from {results.title}",
         str(results),
-        f"{results.trained_on:,} scans to learn from, {held_out:,} held out: these choose the best "
-        "epoch and measure the student, which does not learn from them. No labels by people are "
-        "read for any of this.",
+        f"{results.trained_on:,} scans to learn from, {results.held_out:,} held out: these choose "
+        "the best epoch and measure the student, which does not learn from them. No labels by "
+        "people are read for any of this.",
         "## Limits of the model",
         "\n".join([*(f"- {doubt}" for doubt in doubts(results)), ALWAYS]),
     ]
@@ -150,15 +130,14 @@ def as_markdown(results: LearnResults) -> str:
     if results.persistence is not None:
         header = ("rain to persistence", "not known to it", "rain to the teacher")
         parts += [BESIDE_PERSISTENCE, _table(header, results.persistence, _persistence_cells)]
-    parts += _pictures(results.pictures, "teacher")
-    if results.evaluated:
+    if results.agreement.points:
         parts += [
             f"## The student: {results.student}",
             AGREEMENT_EXPLAINED,
             _table(("removed", "P", "R", "IoU"), results.agreement, _student_cells),
         ]
-        parts += _pictures(results.pictures, "removed")
-        parts += ["## Held-out scans", *_pictures(results.pictures, "held_out")]
+        pictures = results.pictures.items()
+        parts += ["## Held-out scans", *(f"![{shows}]({path.name})" for path, shows in pictures)]
     if results.record:
         parts += ["## Scores by the labels, for the record", results.record]
     parts += ["## How it was made", "\n".join(f"    {step}" for step in results.commands)]
@@ -214,7 +193,7 @@ def _doubts_of_teacher(results: LearnResults) -> Iterator[str]:
             f"Persistence, the comparison for the teacher, is sure of only {known:.0%} of the "
             "points: it cannot confirm most of the teacher's labels."
         )
-    for name, band in coarse_bands(results.persistence).items():
+    for name, band in results.persistence.by_range.items():
         rain = band.shares[1]
         if rain > max(MORE_THAN_TAUGHT * band.removed, band.removed + MORE_BY):
             yield (
@@ -226,7 +205,7 @@ def _doubts_of_teacher(results: LearnResults) -> Iterator[str]:
 
 def _doubts_of_student(results: LearnResults) -> Iterator[str]:
     """Doubts that the held-out scans raise."""
-    if not results.evaluated:
+    if not results.agreement.points:
         return
     agreement = results.agreement
     rain = agreement.agreement.true_positive + agreement.agreement.false_negative
@@ -241,7 +220,7 @@ def _doubts_of_student(results: LearnResults) -> Iterator[str]:
             f"{agreement.agreement.iou:.2f} only: one of the two is often wrong. Look at the "
             "pictures."
         )
-    for name, band in coarse_bands(agreement).items():
+    for name, band in agreement.by_range.items():
         _, rain_share, unknown = band.shares
         perhaps = rain_share + unknown
         if band.removed > max(MORE_THAN_TAUGHT * perhaps, perhaps + MORE_BY):
@@ -260,7 +239,7 @@ def _table(
     header: Sequence[str], answers: Answers, cells: Callable[[Answers], Iterable[str]]
 ) -> str:
     """A table with a row for all points, and one for each band of range that has points."""
-    bands = {"all": answers, **coarse_bands(answers)}
+    bands = {"all": answers, **answers.by_range}
     rows = [[name, f"{band.points:,}", *cells(band)] for name, band in bands.items() if band.points]
     return markdown_table(("range", "points", *header), rows)
 
@@ -277,11 +256,3 @@ def _student_cells(band: Answers) -> Iterable[str]:
     counts = band.agreement
     scores = map(number_text, (counts.precision, counts.recall, counts.iou))
     return f"{band.removed:.1%}", *scores
-
-
-def _pictures(pictures: Mapping[Path, str], beginning: str) -> list[str]:
-    return [
-        f"![{shows}]({path.name})"
-        for path, shows in pictures.items()
-        if path.name.startswith(beginning)
-    ]

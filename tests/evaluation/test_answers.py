@@ -7,7 +7,6 @@ import pytest
 
 from derain.cards.card import DataCard
 from derain.evaluation.answers import (
-    FINE_EDGES,
     NOT_KNOWN,
     NOT_RAIN,
     RAIN,
@@ -15,7 +14,7 @@ from derain.evaluation.answers import (
     TruthRecord,
     answer_of,
 )
-from derain.evaluation.counts import Counts
+from derain.evaluation.counts import RANGE_EDGES, Counts
 from derain.evaluation.hard_cases import scene
 from derain.scan import Bools, Ints, Scan
 from derain.sources.frame import MemoryFrame
@@ -37,7 +36,7 @@ def test_every_point_that_can_be_judged_is_counted_once(judged, card) -> None:
     for scan, called in judged:
         answer = answer_of(scan, card)
         for row in np.flatnonzero(scan.valid):
-            band = max(i for i, edge in enumerate(FINE_EDGES) if scan.range[row] >= edge)
+            band = max(i for i, edge in enumerate(RANGE_EDGES) if scan.range[row] >= edge)
             expected[band, answer[row], int(called[row])] += 1
     np.testing.assert_array_equal(answers.table, expected)
     assert answers.points == sum(scan.valid.sum() for scan, _ in judged)

@@ -5,34 +5,37 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from derain.evaluation.answers import FINE_EDGES, NOT_KNOWN, NOT_RAIN, RAIN, Answers, AnswersOfScan
+from derain.evaluation.answers import NOT_KNOWN, NOT_RAIN, RAIN, Answers
+from derain.evaluation.counts import RANGE_EDGES
 from derain.workflows.learn_report import ALWAYS, LearnResults, as_markdown, doubts
 
 
 def answers(
     not_rain: int, rain: int, unknown: int = 0, removed: tuple[int, int, int] = (0, 0, 0)
 ) -> Answers:
-    """Points of 10 to 15 m; of each answer of the teacher, so many are called rain."""
-    table = np.zeros((len(FINE_EDGES), 3, 2), np.int64)
+    """Points of 10 to 20 m; of each answer of the teacher, so many are called rain."""
+    table = np.zeros((len(RANGE_EDGES), 3, 2), np.int64)
     for answer, points, called in zip(
         (NOT_RAIN, RAIN, NOT_KNOWN), (not_rain, rain, unknown), removed, strict=True
     ):
-        table[FINE_EDGES.index(10), answer] = points - called, called
+        table[RANGE_EDGES.index(10), answer] = points - called, called
     return Answers(table)
 
 
 def results_of(
     taught: Answers, student: Answers | None = None, scans: int = 16, **facts
 ) -> LearnResults:
-    """Results of some scans, all alike, of which the last four are held out."""
+    """Results of some scans, all alike, of which four are held out."""
     return LearnResults(
         "a drive",
         "persistence",
         "outdet",
         Path("model.onnx"),
         Path("work/report.md"),
-        [AnswersOfScan(n >= scans - 4, taught) for n in range(scans)],
-        [] if student is None else [AnswersOfScan(True, student)],
+        sum([taught] * scans, Answers()),
+        scans - 4,
+        4,
+        student or Answers(),
         **facts,
     )
 
@@ -93,6 +96,10 @@ def test_the_tables_hold_the_counts() -> None:
     (row,) = [line for line in text.splitlines() if line.startswith("| 10-20 m | 100,000 |")]
     assert [cell.strip() for cell in row.split("|")[3:-1]] == ["9.0%", "1.0%", "3.0%"]
     # Before the training, the report is of the teacher alone.
-    text = as_markdown(results_of(GOOD, pictures={Path("work/teacher.png"): "shares"}))
-    assert "![shares](teacher.png)" in text
-    assert "## The student" not in text
+    assert "## The student" not in as_markdown(results_of(GOOD))
+
+
+def test_the_pictures_of_held_out_scans_are_in_the_report() -> None:
+    pictures = {Path("work/held_out_1.png"): "9 before and after"}
+    text = as_markdown(results_of(GOOD, GOOD, pictures=pictures))
+    assert "![9 before and after](held_out_1.png)" in text
