@@ -16,9 +16,9 @@ describes how far to trust it, with the commands that repeat each step.
 The default teacher is the model that comes with derain, which sees the scans before and after each;
 the network begins with the weights of the same model. If --model or --blind selects another
 network, its weights are random. The teacher persistence uses free space alone: solid things stay in
-their place, and drops do not. The report compares the two. Labels beside the scans are not read;
-with --card, they measure the finished model, for the record. Labels, runs and report go to a folder
-beside the model, which a second run clears.
+their place, and drops do not. The report compares the two. Labels beside the scans are not read:
+`derain bench` measures the finished model by them. The teacher's labels, runs and report go to a
+folder beside the model, which a second run clears.
 """
 
 import argparse
@@ -71,11 +71,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--work", type=Path, help="folder for everything else (default: beside the model)"
     )
     parser.add_argument(
-        "--card",
-        help="data card of labels beside the scans, which measure the finished model for the "
-        "record",
-    )
-    parser.add_argument(
         "--rerun",
         type=Path,
         metavar="FILE",
@@ -104,7 +99,6 @@ def main(arguments: argparse.Namespace) -> int:
         blind=arguments.blind,
         columns=arguments.columns,
         epochs=arguments.epochs,
-        card=arguments.card,
         start=arguments.start,
     )
     results = learn(config, print_lines)

@@ -135,17 +135,16 @@ class TruthRecord:
 
     Args:
         card: Data card of the scans.
-        titles: Name of each answer.
 
     Attributes:
         scans: Number of scans that were measured.
-        counts: The points of all scans, by the title of the answer.
+        counts: The points of all scans, by what they are measured on (``OF_TEACHER``).
     """
 
-    def __init__(self, card: DataCard, titles: Sequence[str] = OF_TEACHER) -> None:
+    def __init__(self, card: DataCard) -> None:
         self.card = card
         self.scans = 0
-        self.counts = {title: RainCounts(card) for title in titles}
+        self.counts = {title: RainCounts(card) for title in OF_TEACHER}
 
     def add(self, frame: Frame, scan: Scan, *answers: tuple[Bools, Bools]) -> None:
         """Measures the answers to one scan.
@@ -175,17 +174,6 @@ class TruthRecord:
             counts.add_cells(of_title)
         self.scans += 1
 
-    def rows_by_class(self, first: str, second: str) -> list[list[str]]:
-        """Each class that has points: its name, its points, and what two answers call rain."""
-        others, rows = self.counts[second].by_class, []
-        for name, counts in self.counts[first].by_class.items():
-            if counts.points:
-                title = f"{name} (rain)" if counts.rain else name
-                shares = (counts.share_lost, others[name].share_lost)
-                called = (number_text(share, ".2%") for share in shares)
-                rows.append([title, f"{counts.points:,}", *called])
-        return rows
-
     def __str__(self) -> str:
         scores = [["", "points", "precision", "recall", "IoU"]]
         for title, counted in self.counts.items():
@@ -193,5 +181,11 @@ class TruthRecord:
             numbers = map(number_text, (pooled.precision, pooled.recall, pooled.iou))
             scores.append([title, f"{sum(astuple(pooled)):,}", *numbers])
         classes = [["class", "points", "called rain", "of those it is sure of"]]
-        classes += self.rows_by_class(*self.counts)
+        of_all, of_sure = (counts.by_class for counts in self.counts.values())
+        for name, counts in of_all.items():
+            if counts.points:
+                title = f"{name} (rain)" if counts.rain else name
+                shares = (counts.share_lost, of_sure[name].share_lost)
+                called = (number_text(share, ".2%") for share in shares)
+                classes.append([title, f"{counts.points:,}", *called])
         return f"{plain_table(scores)}\n{plain_table(classes)}"

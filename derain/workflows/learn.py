@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from derain.annotation.manifest import FEWEST_SCANS
-from derain.cards.card import load_card
 from derain.datamodules.taught import Taught
 from derain.errors import InputError
 from derain.export.methods import load_method, named_method, over_recording
@@ -69,8 +68,6 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
             f"{scans}: too few for training and validation",
             f"Record {FEWEST_SCANS} or more, one after the other; twenty are enough.",
         )
-    if config.card is not None:
-        load_card(config.card)  # which is used after the training
     student = student_of(config, source)
     require_writable(config.out)
     _clear(config.work)
@@ -114,7 +111,7 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
         steps.end(f"IoU {trained.iou:.3f} on held-out scans, last epoch" if scored else "trained")
         export_checkpoint(config.checkpoint, config.out, steps)
     steps.begin("Measuring: the model on held-out scans")
-    evaluate_student(results, data, Derainer(config.out), config.card)
+    evaluate_student(results, data, Derainer(config.out))
     write_report(results)
     steps.end(f"report: {results.path}")
     show(f"Done in {steps.elapsed}")

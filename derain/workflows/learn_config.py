@@ -48,8 +48,6 @@ class LearnConfig:
         blind: True if the network learns without intensity.
         columns: Names of the columns of files that do not name them.
         epochs: Epochs of the training; None for those of the network's configuration.
-        card: Data card of the scans' own labels, which measure the finished model; None measures
-            nothing.
         start: The trained model whose weights the network begins with. None draws them at random
             where a network is named, or one without intensity is wanted, and else begins with
             the model that comes with derain.
@@ -68,7 +66,6 @@ class LearnConfig:
     blind: bool = False
     columns: Sequence[str] = DEFAULT_COLUMNS
     epochs: int | None = None
-    card: str | None = None
     start: str | None = None
     topic: str | None = None
 

@@ -64,7 +64,6 @@ class LearnResults:
         sees_intensity: True if the student does, in the unit of this recording.
         warnings: Warnings of all steps, in order.
         pictures: Title of each picture, by file in the folder of the report.
-        record: Scores by the scans' own labels, in Markdown; empty where none were measured.
         commands: Commands that repeat the steps.
     """
 
@@ -82,7 +81,6 @@ class LearnResults:
     sees_intensity: bool = True
     warnings: Sequence[str] = ()
     pictures: dict[Path, str] = field(default_factory=dict)
-    record: str = ""
     commands: Sequence[str] = ()
 
     def __str__(self) -> str:
@@ -138,8 +136,6 @@ def as_markdown(results: LearnResults) -> str:
         ]
         pictures = results.pictures.items()
         parts += ["## Held-out scans", *(f"![{shows}]({path.name})" for path, shows in pictures)]
-    if results.record:
-        parts += ["## Scores by the labels, for the record", results.record]
     parts += ["## How it was made", "\n".join(f"    {step}" for step in results.commands)]
     return "\n\n".join(parts) + "\n"
 

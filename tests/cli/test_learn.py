@@ -70,7 +70,6 @@ def test_a_recording_becomes_a_model_and_a_report_whatever_its_labels(succeed, r
     assert "4 scans to learn from, 1 held out" in report
     assert "(held_out_1.png)" in report
     assert imread(work / "held_out_1.png")[..., :3].std() > 0
-    assert "Scores by the labels" not in report
     # The share in the report is that of the model.
     removed = derainer(scene(600, seed=4)).mean()
     assert f"removes {removed:.1%} of the points" in report
@@ -78,15 +77,14 @@ def test_a_recording_becomes_a_model_and_a_report_whatever_its_labels(succeed, r
         assert f"\n    derain {step} " in report
     assert "--start mine.ckpt" in report
 
-    # Again, with labels beside the scans that are all wrong, and asked to measure by them.
+    # Again, with labels beside the scans that are all wrong.
     without_labels = weights(Path("model.onnx"))
     for number in range(5):
         label = recording.parent / "labels" / f"{number:06d}.label"
         write_labels(label, np.where(np.arange(600) < 540, 110, 65535))
     (work / "left.txt").touch()
-    succeed(*command, "--card", "wads", "--rerun", "report.rrd")
+    succeed(*command, "--rerun", "report.rrd")
     assert weights(Path("model.onnx")) == without_labels
-    assert "Nothing could be measured" in (work / "report.md").read_text()
     assert not (work / "left.txt").exists()
     shows_teacher_and_student(ReadBack(Path("report.rrd")), recording, work)
 
@@ -116,7 +114,6 @@ def test_a_folder_of_something_else_is_not_cleared(refused, recording) -> None:
     [
         (2, (), "2 scans: too few for training and validation"),
         (3, ("--teacher", "nobody"), "derain: nobody: no such method or file"),
-        (3, ("--card", "nobody's"), "nobody's: no such data card"),
         (3, ("--poses", "none.txt", "--teacher", "dror"), "none.txt"),
     ],
 )
