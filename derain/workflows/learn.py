@@ -13,12 +13,10 @@ from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.files.atomic import require_writable, write_text
 from derain.models.checkpoint import load_model
-from derain.recordings.posed import ODOMETRY, STANDING
+from derain.recordings.posed import STANDING
 from derain.sources.folders import named_frames
 from derain.sources.judging import Failures, Guard
 from derain.sources.method import Method
-from derain.sources.recordings import recordings_of
-from derain.sources.records import POSES
 from derain.sources.source import Source
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import recorded_warnings, warn
@@ -26,14 +24,14 @@ from derain.workflows.evaluation import beside_persistence, evaluate_student
 from derain.workflows.fit import fit, fit_options
 from derain.workflows.learn_config import PERSISTENCE, LearnConfig, Student, student_of
 from derain.workflows.learn_report import LEAST_RAIN, LearnResults, write_report
-from derain.workflows.odometry import find_poses, placed
+from derain.workflows.odometry import placed
 from derain.workflows.progress import Show, Steps, show_nothing
 from derain.workflows.teaching import TeachResults, teach_recordings
 
 # A folder with this file may be cleared by a second run.
 MARK = "learning.txt"
 
-# Teaching, training, export and measuring; odometry comes first where nothing states the poses.
+# Teaching, training, export and measuring.
 LEARN_STEPS = 4
 
 
@@ -75,14 +73,13 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
     show(f"{len(source):,} scans to learn from. Everything but the model goes to {config.work}/")
     if student.blind and not config.blind and student.start is None:
         show("The scans have no intensities: the network is trained without them.")
-    steps = Steps(show, LEARN_STEPS + config.needs_odometry(source))
+    steps = Steps(show, LEARN_STEPS)
     with recorded_warnings() as warnings:
-        poses = _find_poses(config, source, steps)
         teacher = over_recording(load_method(*named_method(config.teacher)))
         found = named_frames(
             config.recordings, config.columns, labelled=True, recordings=True, topic=config.topic
         )
-        recording = placed(found, poses)
+        recording = placed(found, config.poses)
         taught = _teach(config, teacher, recording, steps, warnings)
         data = Taught(str(config.taught))
         # Scans suit persistence, another teacher, where this one sees several at a time.
@@ -100,7 +97,7 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
             stood=config.poses == STANDING,
             sees_intensity=student.sees_unit,
             warnings=warnings,
-            commands=commands(config, student, source, poses),
+            commands=commands(config, student),
         )
         write_report(results)  # the teacher's labels are worth a look, whatever follows
         _refuse_clean(results)
@@ -118,25 +115,20 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
     return results
 
 
-def commands(config: LearnConfig, student: Student, source: Source, poses: str | None) -> list[str]:
+def commands(config: LearnConfig, student: Student) -> list[str]:
     """Commands that repeat the steps of :func:`learn`.
 
     Args:
         config: Options of the run.
         student: The network that learns.
-        source: The scans.
-        poses: Poses that the teacher is given; None for those beside the scans.
     """
     scans = [*map(str, config.recordings)]
     topic = () if config.topic is None else ("--topic", config.topic)
     reading = (*topic, "--columns", ",".join(config.columns))
     taught = str(config.taught)
-    steps: list[Sequence[str]] = []
-    if config.needs_odometry(source):
-        steps += [("odometry", *scans, "--out", str(_poses_file(config, source)), *reading)]
-    pose_options = () if poses is None else ("--poses", poses)
-    steps += [
-        ("teach", config.teacher, *scans, "--out", taught, *pose_options, *reading),
+    poses = () if config.poses is None else ("--poses", config.poses)
+    steps = [
+        ("teach", config.teacher, *scans, "--out", taught, *poses, *reading),
         ("fit", *fit_options(student.config, _settings(config, student))),
         ("export", str(config.checkpoint), "--out", str(config.out)),
     ]
@@ -173,30 +165,6 @@ def _clear(work: Path) -> None:
 def _warning_guard() -> Guard:
     """Turns the error of one scan into a warning; the others go on."""
     return Failures(lambda error: warn(str(error))).skipping_failures
-
-
-def _poses_file(config: LearnConfig, source: Source) -> Path:
-    return config.work / (POSES if len(recordings_of(source)) == 1 else "poses")
-
-
-def _find_poses(config: LearnConfig, source: Source, steps: Steps) -> str | None:
-    """Runs odometry where the teacher needs it.
-
-    Returns:
-        The poses for the teacher, as :func:`derain.workflows.odometry.placed` takes them.
-    """
-    if not config.needs_odometry(source):
-        return config.poses
-    file = _poses_file(config, source)
-    steps.begin(f"Odometry: poses of {len(source):,} scans")
-    recordings = find_poses(source, file, guard=_warning_guard())
-    faults = [found.fault for found in recordings if found.fault is not None]
-    if len(faults) == len(recordings):
-        raise faults[0]
-    steps.end("\n        ".join(str(found) for found in recordings if found.fault is None))
-    # A file of poses does not mark where odometry failed; done again, it leaves a gap there.
-    failed = any(found.untrusted for found in recordings)
-    return ODOMETRY if failed else str(file)
 
 
 def _teach(

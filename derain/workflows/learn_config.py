@@ -10,7 +10,6 @@ from derain.default import DEFAULT
 from derain.errors import InputError
 from derain.export.methods import CUES
 from derain.files import DEFAULT_COLUMNS
-from derain.recordings.posed import ODOMETRY
 from derain.scan import Scan
 from derain.sources.judging import Failures
 from derain.sources.source import Source
@@ -44,7 +43,7 @@ class LearnConfig:
         model: Name of the network; None for that of the start, and for 3D-OutDet without one.
         teacher: Name of the teacher, or the file of a model.
         poses: Poses of the scans, as the option ``--poses`` takes them; None for those beside the
-            scans, and for odometry where there are none.
+            scans. A teacher that needs poses finds them where there are none.
         blind: True if the network learns without intensity.
         columns: Names of the columns of files that do not name them.
         epochs: Epochs of the training; None for those of the network's configuration.
@@ -93,20 +92,6 @@ class LearnConfig:
     def checkpoint(self) -> Path:
         """Checkpoint of the student, the best by its agreement with the teacher."""
         return self.work / "student.ckpt"
-
-    def needs_odometry(self, source: Source) -> bool:
-        """True if poses are to be found before the teaching.
-
-        The configuration names odometry, or the teacher needs poses that no file states.
-
-        Args:
-            source: The scans.
-
-        Raises:
-            InputError: A record of poses that is damaged or does not fit the scans.
-        """
-        known = self.poses is not None or all(frame.pose is not None for frame in source)
-        return self.poses == ODOMETRY or (self.teacher == PERSISTENCE and not known)
 
 
 @dataclass(frozen=True)

@@ -125,20 +125,6 @@ def test_what_does_not_go_with_a_start_is_refused(
         student_of(config(tmp_path / "scans", start=start, **options), scans)
 
 
-def test_odometry_is_needed_where_there_are_no_poses(tmp_path) -> None:
-    folder = tmp_path / "drive/velodyne"
-    write_scans(folder)
-
-    def needed(teacher: str, poses: str | None) -> bool:
-        asked = config(folder, teacher=teacher, poses=poses)
-        return asked.needs_odometry(named_frames([folder]))
-
-    given = [("persistence", poses) for poses in (None, "standing", "poses.txt", "odometry")]
-    assert [needed(*each) for each in [*given, ("dror", None)]] == [True, False, False, True, False]
-    (tmp_path / "drive/poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * 3)
-    assert [needed(*each) for each in given] == [False, False, False, True]
-
-
 def test_a_training_without_an_epoch_is_refused() -> None:
     with pytest.raises(InputError, match="epochs"):
         LearnConfig([Path("drive")], Path("model.onnx"), epochs=0)
