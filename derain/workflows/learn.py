@@ -15,7 +15,7 @@ from derain.files.atomic import require_writable, write_text
 from derain.models.checkpoint import load_model
 from derain.recordings.posed import STANDING
 from derain.sources.folders import named_frames
-from derain.sources.judging import Failures, Guard
+from derain.sources.judging import Failures
 from derain.sources.method import Method
 from derain.sources.source import Source
 from derain.system.memory import keep_freed_memory
@@ -162,11 +162,6 @@ def _clear(work: Path) -> None:
     write_text(mark, "Written by derain learn, which clears this folder.\n")
 
 
-def _warning_guard() -> Guard:
-    """Turns the error of one scan into a warning; the others go on."""
-    return Failures(lambda error: warn(str(error))).skipping_failures
-
-
 def _teach(
     config: LearnConfig, teacher: Method, recording: Source, steps: Steps, warnings: Sequence[str]
 ) -> TeachResults:
@@ -176,7 +171,9 @@ def _teach(
         InputError: So few scans are labelled that none of them is held out.
     """
     steps.begin(f"Teaching: {config.teacher} labels the scans")
-    results = teach_recordings(teacher, recording, config.taught, guard=_warning_guard())
+    # The error of one scan is a warning; the others go on.
+    guard = Failures(lambda error: warn(str(error))).skipping_failures
+    results = teach_recordings(teacher, recording, config.taught, guard=guard)
     labelled = len(results.manifest.scans)
     if not results.held_out:
         reason = f": {warnings[0]}" if warnings else ""
