@@ -1,21 +1,24 @@
 """The bytes of a ``sensor_msgs/PointCloud2`` message, as ROS 1 and ROS 2 write them.
 
-The bytes before and after the cloud are kept, so a message whose cloud does not change is written
-back byte for byte. The library that reads bags is not used here: it needs the definitions of types,
-which bags of older ROS 2 do not hold.
+The library of bags reads and writes them by its own definition of the type, which bags of older
+ROS 2 do not hold. A message whose cloud does not change is written back byte for byte, except for
+up to three bytes that DDS may append so that its length is a multiple of four.
 
 Numbers of a message are little-endian, whatever the order of the bytes of its points.
 
-Source: of ROS 1, http://wiki.ros.org/msg ("Fields", nothing aligned). Of ROS 2, CDR of DDSI-RTPS
-2.5, 10.2 (encapsulation) and CORBA 3.3 part 2, 9.3 (alignment from the end of the encapsulation
-header).
+Source: of the encapsulation of ROS 2, CDR of DDSI-RTPS 2.5, 10.2.
 """
 
 import struct
-from dataclasses import dataclass
-from typing import Self
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any, Self
+
+import numpy as np
 
 from derain.bags.point_cloud import PointCloud, PointField
+from derain.bags.topics import POINT_CLOUD
+from derain.system.extras import ROSBAGS
 
 # What an encapsulation begins with: plain CDR in little-endian byte order; and its size.
 PLAIN_CDR, CDR_HEADER = b"\x00\x01", 4
@@ -26,8 +29,8 @@ ROS1, CDR = "ros1", "cdr"
 # In ROS 1 a header begins with a counter of messages, in ROS 2 with the stamp.
 STAMP_AT = {ROS1: 4, CDR: CDR_HEADER}
 
-# Strings of ROS may be any bytes.
-TEXT = ("utf-8", "surrogateescape")
+# The name of the type of its fields, beside POINT_CLOUD.
+POINT_FIELD = "sensor_msgs/msg/PointField"
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,16 +39,14 @@ class CloudMessage:
 
     Attributes:
         encoding: ``ros1`` or ``cdr``.
-        head: Its bytes up to the cloud: the header with stamp and frame.
+        content: The message, as the library has it.
         cloud: The cloud.
-        tail: Its bytes after the cloud.
         stamp: Time of the cloud, nanoseconds; 0 where the driver writes none.
     """
 
     encoding: str
-    head: bytes
+    content: Any
     cloud: PointCloud
-    tail: bytes
     stamp: int
 
     @classmethod
@@ -60,33 +61,50 @@ class CloudMessage:
             ValueError: Bytes that are no PointCloud2, or one that contradicts itself.
         """
         stamp = stamp_of(message, encoding)
-        read = _Reader(message, encoding)
-        read.take(STAMP_AT[encoding] - read.position + 8)  # the stamp
-        read.string()  # the frame
-        head = message[: read.position]
-        height, width, count = read.numbers("III")
-        fields = tuple(PointField(read.string(), *read.numbers("IBI")) for _ in range(count))
-        bigendian, point_step, row_step, size = read.numbers("BIII")
-        data = read.take(size)
-        (dense,) = read.numbers("B")
+        store = _store(encoding)
+        read = store.deserialize_ros1 if encoding == ROS1 else store.deserialize_cdr
+        try:
+            content = read(memoryview(message), POINT_CLOUD)
+        except ROSBAGS.load("bags", "serde").SerdeError as error:
+            raise ValueError(str(error)) from error
         cloud = PointCloud(
-            height, width, fields, bool(bigendian), point_step, row_step, data, bool(dense)
+            content.height,
+            content.width,
+            tuple(PointField(f.name, f.offset, f.datatype, f.count) for f in content.fields),
+            content.is_bigendian,
+            content.point_step,
+            content.row_step,
+            memoryview(content.data),
+            content.is_dense,
         )
-        tail = message[read.position :]
-        return cls(encoding, head, cloud, tail, stamp)
+        return cls(encoding, content, cloud, stamp)
 
     def to_bytes(self) -> bytes:
         """The bytes of the message."""
-        cloud, write = self.cloud, _Writer(self.head, self.encoding)
-        write.numbers("III", cloud.height, cloud.width, len(cloud.fields))
-        for field in cloud.fields:
-            write.string(field.name)
-            write.numbers("IBI", field.offset, field.datatype, field.count)
-        write.numbers("BIII", cloud.is_bigendian, cloud.point_step, cloud.row_step, len(cloud.data))
-        write.message += cloud.data
-        write.numbers("B", cloud.is_dense)
-        write.message += self.tail
-        return bytes(write.message)
+        cloud, store = self.cloud, _store(self.encoding)
+        field = store.types[POINT_FIELD]
+        content = replace(
+            self.content,
+            height=cloud.height,
+            width=cloud.width,
+            fields=[field(f.name, f.offset, f.datatype, f.count) for f in cloud.fields],
+            is_bigendian=cloud.is_bigendian,
+            point_step=cloud.point_step,
+            row_step=cloud.row_step,
+            data=np.frombuffer(cloud.data, np.uint8),
+            is_dense=cloud.is_dense,
+        )
+        write = store.serialize_ros1 if self.encoding == ROS1 else store.serialize_cdr
+        return bytes(write(content, POINT_CLOUD))
+
+
+@cache
+def _store(encoding: str) -> Any:
+    """The types of ROS 1 or ROS 2 as the library knows them."""
+    types = ROSBAGS.load("bags", "typesys")
+    return types.get_typestore(
+        types.Stores.ROS1_NOETIC if encoding == ROS1 else types.Stores.ROS2_HUMBLE
+    )
 
 
 def stamp_of(message: bytes, encoding: str) -> int:
@@ -107,59 +125,3 @@ def stamp_of(message: bytes, encoding: str) -> int:
     kinds = "<iI" if encoding == CDR else "<II"  # seconds are signed in ROS 2
     seconds, nanoseconds = struct.unpack_from(kinds, message, start)
     return int(seconds) * 10**9 + int(nanoseconds)
-
-
-def _aligned(position: int, size: int, encoding: str) -> int:
-    """The next position at which a number of `size` bytes may begin."""
-    return position if encoding == ROS1 else position + (CDR_HEADER - position) % size
-
-
-class _Reader:
-    """Reads the values of a message one after the other."""
-
-    def __init__(self, message: bytes, encoding: str) -> None:
-        self.message = memoryview(message)
-        self.encoding = encoding
-        self.position = 0
-
-    def numbers(self, kinds: str) -> list[int]:
-        values: list[int] = []
-        for kind in kinds:
-            layout = struct.Struct("<" + kind)
-            self.position = _aligned(self.position, layout.size, self.encoding)
-            values += layout.unpack(self.take(layout.size))
-        return values
-
-    def string(self) -> str:
-        (size,) = self.numbers("I")
-        text = bytes(self.take(size))
-        if self.encoding == CDR and text:
-            if text[-1]:
-                raise ValueError("a text in it does not end as CDR requires")
-            text = text[:-1]
-        return text.decode(*TEXT)
-
-    def take(self, size: int) -> memoryview:
-        start, self.position = self.position, self.position + size
-        if self.position > len(self.message):
-            raise ValueError("the message ends too early")
-        return self.message[start : self.position]
-
-
-class _Writer:
-    """Appends values to the bytes of a message."""
-
-    def __init__(self, head: bytes, encoding: str) -> None:
-        self.message = bytearray(head)
-        self.encoding = encoding
-
-    def numbers(self, kinds: str, *values: int) -> None:
-        for kind, value in zip(kinds, values, strict=True):
-            layout = struct.Struct("<" + kind)
-            place = _aligned(len(self.message), layout.size, self.encoding)
-            self.message += bytes(place - len(self.message)) + layout.pack(value)
-
-    def string(self, text: str) -> None:
-        content = text.encode(*TEXT) + (b"\0" if self.encoding == CDR else b"")
-        self.numbers("I", len(content))
-        self.message += content

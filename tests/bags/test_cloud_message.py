@@ -80,10 +80,26 @@ def test_big_endian_points_are_read_and_written_alike() -> None:
 def test_a_message_that_is_cut_off_or_of_another_kind_is_refused(encoding) -> None:
     message = made_by_library(encoding)
     for end in range(len(message)):
-        with pytest.raises(ValueError, match=r"ends too early|plain CDR|does not end"):
+        with pytest.raises(ValueError, match=r"ends too early|plain CDR|PointCloud2|Invalid"):
             CloudMessage.parse(message[:end], encoding)
     with pytest.raises(ValueError, match="plain CDR"):
         CloudMessage.parse(b"\x00\x00\x00\x00" + made_by_library(CDR)[4:], CDR)
+
+
+@pytest.mark.parametrize("encoding", [ROS1, CDR])
+def test_bytes_behind_a_message_are_refused_and_padding_is_not(encoding) -> None:
+    message = made_by_library(encoding)
+    with pytest.raises(ValueError, match="PointCloud2"):
+        CloudMessage.parse(message + bytes(4), encoding)
+    if encoding == CDR:  # DDS pads to a multiple of four bytes
+        assert CloudMessage.parse(message + bytes(3), CDR).to_bytes() == message
+
+
+@pytest.mark.parametrize("encoding", [ROS1, CDR])
+def test_a_name_that_is_not_utf_8_is_refused(encoding) -> None:
+    message = made_by_library(encoding).replace(b"intensity", b"intensit\xe9")
+    with pytest.raises(ValueError, match="utf-8"):
+        CloudMessage.parse(message, encoding)
 
 
 @given(st.data(), st.sampled_from([ROS1, CDR]))

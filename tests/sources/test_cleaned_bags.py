@@ -72,7 +72,8 @@ def test_only_the_points_of_rain_are_lost(tmp_path, storage, run_derain, rain) -
         was, now = cloud_of(old[3], storage), cloud_of(new[3], storage)
         points = np.frombuffer(was.cloud.data, np.uint8).reshape(len(mask), -1)
         assert points[~mask].tobytes() == bytes(now.cloud.data)
-        assert (now.head, now.cloud.fields) == (was.head, was.cloud.fields)
+        assert now.content.header == was.content.header
+        assert now.cloud.fields == was.cloud.fields
 
 
 def test_what_was_removed_can_be_kept(tmp_path, storage, run_derain, rain) -> None:
