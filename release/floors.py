@@ -1,7 +1,7 @@
 """The lowest version of each dependency that pyproject.toml admits, as constraints for pip.
 
-    python -m release.floors > floors.txt           those of plain derain
-    python -m release.floors train las > floors.txt    and of some extras
+    python -m release.floors > floors.txt                 those of plain derain
+    python -m release.floors train feather > floors.txt    and of some extras
     pip install -c floors.txt .
 
 An installation with these constraints shows whether the floors are true.

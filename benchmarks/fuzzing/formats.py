@@ -77,62 +77,6 @@ def _feather_bomb(compression: str) -> bytes:
     return bytes(sink.getvalue()).replace(stated, struct.pack("<q", BOMB * 10**6))
 
 
-# Where the header of a LAS file counts the records that follow it, and the points: LAS 1.4 R15,
-# table 3.
-_LAS_RECORDS, _LAS_POINTS = 100, 247
-
-
-def _las(suffix: str, version: str) -> bytes:
-    """A survey as laspy writes it."""
-    import laspy
-
-    header = laspy.LasHeader(version=version, point_format=7 if version == "1.4" else 3)
-    header.offsets, header.scales = np.array([4e5, 5e6, 0]), np.full(3, 0.001)
-    las = laspy.LasData(header)
-    points = scene(POINTS)
-    las.xyz = points[:, :3] + header.offsets
-    las.intensity = points[:, 3].astype(np.uint16)
-    file = io.BytesIO()
-    las.write(file, do_compress=suffix == ".laz")
-    return file.getvalue()
-
-
-def _surveys(suffix: str) -> Sequence[bytes]:
-    return [_las(suffix, version) for version in ("1.2", "1.4")]
-
-
-def _las_with(place: int, value: bytes, suffix: str) -> bytes:
-    content = _las(suffix, "1.4")
-    return content[:place] + value + content[place + len(value) :]
-
-
-def _las_counts(suffix: str) -> Sequence[Callable[[], bytes]]:
-    """Counts of points and of records that no file can hold."""
-    return (
-        partial(_las_with, _LAS_POINTS, struct.pack("<Q", 2**40), suffix),
-        partial(_las_with, _LAS_RECORDS, b"\xff\xff\xff\xff", suffix),
-    )
-
-
-def _laz_of_many_chunks() -> bytes:
-    _, table = _laz_chunks()
-    return _las_with(table + 4, b"\xf0\xff\xff\xff", ".laz")
-
-
-def _laz_of_a_long_layer() -> bytes:
-    begin, _ = _laz_chunks()
-    # Behind the place of the table are the first point, of 36 bytes, and the number of points.
-    return _las_with(begin + 8 + 36 + 4, b"\xf0\xff\xff\xff", ".laz")
-
-
-def _laz_chunks() -> tuple[int, int]:
-    """Begin of the compressed points, and of their table of chunks."""
-    content = _las(".laz", "1.4")
-    (begin,) = struct.unpack_from("<I", content, 96)
-    (table,) = struct.unpack_from("<q", content, begin)
-    return begin, table
-
-
 def _structured_npy() -> bytes:
     rows = np.zeros(POINTS, [("x", "<f4"), ("y", ">f4"), ("z", "<f8"), ("intensity", "u1")])
     for name, column in zip(rows.dtype.names or (), scene(POINTS).T, strict=True):
@@ -288,11 +232,6 @@ INPUTS: dict[str, FormatInputs] = {
         lambda: [_ply(encoding, faces) for encoding in PLY_ENCODINGS for faces in (0, 2)],
     ),
     ".feather": FormatInputs((partial(_feather_bomb, "lz4"), partial(_feather_bomb, "zstd"))),
-    ".las": FormatInputs(_las_counts(".las"), partial(_surveys, ".las")),
-    ".laz": FormatInputs(
-        (*_las_counts(".laz"), _laz_of_many_chunks, _laz_of_a_long_layer),
-        partial(_surveys, ".laz"),
-    ),
 }
 
 _HOSTILE_TABLES: Sequence[Callable[[], bytes]] = (

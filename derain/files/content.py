@@ -13,7 +13,7 @@ from pathlib import Path
 from derain.files.names import is_compressed
 from derain.files.reading import read_bytes, reading
 
-# Bytes that a scan may take, in its file or decoded: 30 million points of an aerial LAS.
+# Bytes that a scan may take, in its file or decoded: 30 million points of 32 bytes.
 LARGEST_SCAN = 2**30
 
 # Bytes that every file may expand to: 400,000 points of twenty columns. A frame that is nearly

@@ -98,6 +98,7 @@ def format_of(path: Path) -> Format:
     """
     suffix = scan_suffix(path)
     if suffix not in FORMATS:
-        remedy = f"Available: {', '.join(FORMATS)}, and each of them with .gz."
+        available = f"Available: {', '.join(FORMATS)}, and each of them with .gz."
+        remedy = f"{available} Convert others to one of these, in the frame of the sensor."
         raise InputError(path, f"'{suffix}' is not the suffix of a scan", remedy)
     return FORMATS[suffix]()

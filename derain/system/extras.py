@@ -24,7 +24,7 @@ class MissingExtraError(InputError, ModuleNotFoundError):
 
 @dataclass(frozen=True)
 class Extra:
-    """A library of one of derain's extras, as in ``pip install 'derain[las]'``.
+    """A library of one of derain's extras, as in ``pip install 'derain[ros]'``.
 
     Attributes:
         name: Name of the smallest extra that installs the library.
@@ -79,7 +79,6 @@ OPTUNA = Extra("train", "optuna")
 OPEN3D = Extra("scene", "open3d")
 PYARROW = Extra("feather", "pyarrow")
 FLATBUFFERS = Extra("feather", "flatbuffers")
-LASPY = Extra("las", "laspy")
 OPENVINO = Extra("openvino", "openvino")
 ROSBAGS = Extra("ros", "rosbags")
 MCAP = Extra("ros", "mcap")
@@ -92,7 +91,7 @@ FSSPEC = Extra("remote", "fsspec")
 
 EXTRAS = (
     *(TORCH, LIGHTNING, TORCHMETRICS, JSONARGPARSE, TENSORBOARD, MATPLOTLIB),
-    *(ONNX, ONNXSCRIPT, OPTUNA, OPEN3D, PYARROW, FLATBUFFERS, LASPY),
+    *(ONNX, ONNXSCRIPT, OPTUNA, OPEN3D, PYARROW, FLATBUFFERS),
     *(OPENVINO, ROSBAGS, MCAP, RERUN, DISTRIBUTED, FSSPEC),
 )
 

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from pathlib import Path
 
-import laspy
 import numpy as np
 import pyarrow
 import pytest
@@ -72,15 +71,6 @@ def repeated_rows() -> bytes:
     return npz(xyz=points, **{f"column{place}": npy((1,), "<f8") for place in range(20)})
 
 
-def las_of_records() -> bytes:
-    """A survey that states four billion records behind its points."""
-    survey = laspy.LasData(laspy.LasHeader(version="1.4", point_format=6))
-    survey.x = survey.y = survey.z = np.arange(9.0)
-    file = io.BytesIO()
-    survey.write(file)
-    return file.getvalue()[:243] + b"\xff\xff\xff\xff" + file.getvalue()[247:]
-
-
 # Zeros, which compress to next to nothing: more than a small file may expand to.
 BOMB = 5 * 2**24
 LZF = struct.pack("<II", 9, 2**32 - 16) + bytes(9)
@@ -96,7 +86,6 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes], str]] = {
     "zip members": (".npz", lambda: npz(**{f"a{n}": b"" for n in range(1100)}), "1,100 columns"),
     "repeated rows": (".npz", repeated_rows, "room for"),
     "item size": (".npy", lambda: npy((1,), [("x", "<f4", (2**28,))]), "bytes in the header"),
-    "records": (".las", las_of_records, "records in the header"),
 }
 OF_THE_FUZZER = {
     f"{suffix} {number}": (suffix, make, "scan")

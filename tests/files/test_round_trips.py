@@ -16,9 +16,6 @@ from derain.files.columns import scan_of
 from derain.files.formats.pcd import ENCODINGS, VALUE_TYPES, PcdHeader
 from derain.files.formats.ply import BYTE_ORDERS, PlyHeader
 
-from .formats.test_las import STREET
-from .formats.test_las import write as write_survey
-
 FLOATS = ("f4", "f8")
 TEXT_TYPES = (*VALUE_TYPES, "b1", "f2")
 NAMES = st.text("abcdefgh_0123456789-.äλ", min_size=2, max_size=6)
@@ -143,13 +140,10 @@ def test_text_gives_back_values_in_64_bits(tmp_path, suffix, names, data) -> Non
             np.testing.assert_array_equal(copy.fields[name], column.astype(np.float64))
 
 
-@pytest.mark.parametrize("suffix", [".npz", ".npy", ".pcd", ".ply", ".feather", ".las", ".laz"])
+@pytest.mark.parametrize("suffix", [".npz", ".npy", ".pcd", ".ply", ".feather"])
 def test_a_file_that_is_cut_off_is_refused(tmp_path, suffix) -> None:
     path = tmp_path / f"scan{suffix}"
-    if suffix in (".las", ".laz"):
-        write_survey(path, STREET)
-    else:
-        write_scan(path, scene(90))
+    write_scan(path, scene(90))
     content = path.read_bytes()
     for size in (0, 1, 5, 20, 200, 300):
         path.write_bytes(content[:size])

@@ -13,7 +13,7 @@ def test_plain_derain_has_a_floor_for_each_dependency() -> None:
 
 def test_an_extra_that_is_made_of_others_has_theirs() -> None:
     of_all = floors(["all"])
-    assert set(of_all) > {*floors(["train"]), *floors(["las"])} > {*floors()}
+    assert set(of_all) > {*floors(["train"]), *floors(["feather"])} > {*floors()}
     assert len(of_all) == len(set(of_all))
     assert not [line for line in of_all if line.startswith("derain")]
 

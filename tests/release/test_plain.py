@@ -140,8 +140,8 @@ def test_methods_are_compared_and_the_missing_picture_is_mentioned(plain, scan) 
 
 def test_a_command_names_its_missing_extra_in_one_line_before_any_work(plain, scan) -> None:
     given, checkpoint = str(scan), str(default_model().with_suffix(".ckpt"))
-    arrow, survey, bag = (scan.with_suffix(suffix) for suffix in (".feather", ".las", ".bag"))
-    for file in (arrow, survey, bag):
+    arrow, bag = (scan.with_suffix(suffix) for suffix in (".feather", ".bag"))
+    for file in (arrow, bag):
         file.write_bytes(b"anything")
     labelled = ["--data", given, "--card", "wads"]
     tried = {
@@ -167,7 +167,6 @@ def test_a_command_names_its_missing_extra_in_one_line_before_any_work(plain, sc
         ("demo", "--out", "out"): ("optuna", "train,scene"),
         ("run", given, "--out", "out", "--runtime", "openvino"): ("openvino", "openvino"),
         ("info", str(arrow)): ("pyarrow", "feather"),
-        ("info", str(survey)): ("laspy", "las"),
         ("info", str(bag)): ("rosbags", "ros"),
     }
     before = {*scan.parent.iterdir()}

@@ -80,7 +80,7 @@ def test_what_is_missing_is_named_with_the_smallest_extras_that_bring_it(
 
 
 def test_what_is_installed_is_not_refused_and_not_imported() -> None:
-    there = Extra("las", "json.tool")
+    there = Extra("feather", "json.tool")
     sys.modules.pop("json.tool", None)
     require("anything", there)
     assert "json.tool" not in sys.modules
@@ -91,7 +91,7 @@ def test_a_library_that_is_there_and_broken_is_not_called_missing(tmp_path, monk
     (tmp_path / "derain_broken.py").write_text("import derain_lacks_this")
     monkeypatch.syspath_prepend(str(tmp_path))
     with pytest.raises(InputError, match=r"cannot be imported.*derain_lacks_this") as refusal:
-        Extra("las", "derain_broken").load("a.las")
+        Extra("feather", "derain_broken").load("a.feather")
     assert not isinstance(refusal.value, MissingExtraError)
 
 
@@ -100,7 +100,7 @@ def test_ctrl_c_in_an_import_is_not_called_a_broken_library(tmp_path, monkeypatc
     (tmp_path / "derain_interrupted.py").write_text(code)
     monkeypatch.syspath_prepend(str(tmp_path))
     with pytest.raises(KeyboardInterrupt):
-        Extra("las", "derain_interrupted").load("a.las")
+        Extra("feather", "derain_interrupted").load("a.feather")
 
 
 def test_an_import_that_failed_names_the_extra_that_would_mend_it(request) -> None:
