@@ -44,7 +44,7 @@ WIDEST_ARRAY = 64
 
 @runtime_checkable
 class PointHeader(Protocol):
-    """A header that describes single points, such as by the faces of a mesh."""
+    """A header that describes single points, such as by their text."""
 
     def take(self, rows: NDArray[Any]) -> "PointHeader":
         """The same of some points only, by their row numbers or a bool mask of shape (N,)."""

@@ -28,7 +28,7 @@ def encode(text: str) -> bytes:
     return text.encode("utf-8", "surrogateescape")
 
 
-def filled_lines(data: bytes, start: int = 0, count: int = sys.maxsize) -> Iterator[bytes]:
+def _filled_lines(data: bytes, start: int = 0, count: int = sys.maxsize) -> Iterator[bytes]:
     """The lines of a text that are not empty: ``count`` of them, after ``start`` others."""
     filled = (line for line in io.BytesIO(data) if line.strip())
     return islice(filled, *(min(place, sys.maxsize) for place in (start, start + count)))
@@ -46,7 +46,7 @@ def parse_rows(data: bytes, row: np.dtype[Any], start: int = 0, count: int = sys
     Raises:
         ValueError: A line that is not of this dtype.
     """
-    lines = filled_lines(data, start, count)
+    lines = _filled_lines(data, start, count)
     first = next(lines, None)
     if first is None:
         return np.empty(0, row)
