@@ -39,7 +39,7 @@ from derain.sources.judging import Guard, unguarded
 from derain.sources.method import Method
 from derain.sources.sink import FolderSink, LabelSink
 from derain.sources.source import Source
-from derain.sources.unit_judging import Placing, UnitJudging
+from derain.sources.unit_judging import UnitJudging
 from derain.sources.units import Division, FrameUnit, units_of, whole
 from derain.system.stopwatch import Stopwatch
 from derain.views.scan_issues import ScanIssue, much_removed
@@ -108,11 +108,8 @@ class Labelling(UnitJudging[LabelledScan]):
 
     def do(self, unit: FrameUnit) -> Iterator[LabelledScan]:
         """Labels the scans of a unit."""
-        placed, doubts = self.placed(unit)
-        unlabelled = placed.of(lambda frames: [frame.without_labels() for frame in frames])
-        for labelled in self.results(unlabelled, partial(self._labelled, placed)):
-            issues = [*doubts.get(labelled.frame.key, ()), *labelled.issues]
-            yield replace(labelled, issues=issues)
+        unlabelled = unit.of(lambda frames: [frame.without_labels() for frame in frames])
+        yield from self.results(unlabelled, partial(self._labelled, unit))
 
     def look(self) -> IsThere[FrameUnit, LabelledScan]:
         """True if all scans of a unit have labels."""
@@ -163,7 +160,6 @@ def teach(
     watch: Watch = lambda scan: None,
     division: Division | None = None,
     executor: Submits | None = None,
-    placing: Placing | None = None,
 ) -> Manifest:
     """Labels recordings: 0 is not rain, 1 rain, 255 not known.
 
@@ -184,8 +180,6 @@ def teach(
             on. None keeps no records.
         executor: Does the units: an executor of :mod:`concurrent.futures` or the like, whose
             processes find all files by the same paths. None does them in this process.
-        placing: Finds where the scans of whole recordings were taken; see
-            :func:`derain.sources.cleaning.clean`.
 
     Returns:
         The manifest. It is not finished, and nothing is in its place, while other shards of the
@@ -202,11 +196,10 @@ def teach(
     if division is not None and division.keeps_records(source, out):
         place = out.absolute()  # other processes may work in another folder
         # The labels of all scans stay there, and are linked to where they belong.
-        work = Labelling(method, fingerprint, placing, place / FOLDER, card)
+        work = Labelling(method, fingerprint, place / FOLDER, card)
         options = work.options("teach", source, division.block)
         options["card"] = None if card is None else card.name
-        block = division.block if placing is None else len(source)  # whole recordings
-        units = units_of(source, method, block)
+        units = units_of(source, method, division.block)
         job, shard = division.begin(place, options, units)
         task = Task(job, work)
         results = (result for _, result, _ in run(task, shard, executor))
@@ -218,7 +211,7 @@ def teach(
             frames = [scan.frame for scan in scans if scan.is_known]
         return _finish(work, out, frames)
     with _unfinished(out) as folder:
-        work = Labelling(method, fingerprint, placing, folder, card)
+        work = Labelling(method, fingerprint, folder, card)
         frames = _known(work.do(whole(source)), len(source), guard, watch)
         return _finish(work, out, frames)
 

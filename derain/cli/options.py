@@ -13,7 +13,7 @@ from derain.cards.card import packaged_cards
 from derain.cli.parser import number, whole
 from derain.errors import InputError, printable
 from derain.files import DEFAULT_COLUMNS
-from derain.recordings.posed import ODOMETRY, STANDING
+from derain.recordings.posed import STANDING
 from derain.scan import Scan
 from derain.sources.frame import Frame
 
@@ -152,8 +152,8 @@ def add_poses(parser: argparse.ArgumentParser) -> None:
         "--poses",
         metavar="POSES",
         help=f"poses of the scans: a file in the format of KITTI or TUM, a folder with one "
-        f"<sequence>.txt per sequence, {STANDING}, or {ODOMETRY} (default: poses.txt beside the "
-        f"scans, otherwise {ODOMETRY})",
+        f"<sequence>.txt per sequence, or {STANDING} (default: poses.txt beside the scans, "
+        "otherwise computed from the scans)",
     )
 
 

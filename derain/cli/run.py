@@ -179,7 +179,6 @@ def main(arguments: argparse.Namespace) -> int:
             source,
             method,
             sink,
-            placing=unit_options.odometry_of(arguments),
             most_removed=arguments.most_removed,
             weather=weather,
             observer=printer,

@@ -90,7 +90,6 @@ def main(arguments: argparse.Namespace) -> int:
             watch=lambda scan: _print_labels(scan, arguments.json),
             division=division,
             executor=executor,
-            placing=unit_options.odometry_of(arguments),
         )
     stream = sys.stderr if arguments.json else sys.stdout
     print_lines(f"{results.judged:,} scans\n{results.answers}", stream)

@@ -3,17 +3,15 @@
 import argparse
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from functools import partial
 
 from derain.cli.options import count
 from derain.errors import InputError
 from derain.jobs.running import Submits
 from derain.jobs.shard import TASK, Shard
 from derain.jobs.workers import processes
-from derain.recordings.posed import ODOMETRY, with_odometry, with_poses
+from derain.recordings.posed import with_poses
 from derain.sources.method import Method
 from derain.sources.source import Source
-from derain.sources.unit_judging import Placing
 from derain.sources.units import BLOCK, Division, spans_of
 from derain.system.cores import threads_of
 from derain.system.memory import total_memory
@@ -156,7 +154,7 @@ def share_threads(arguments: argparse.Namespace, workers: int) -> bool:
 
 
 def prepared(source: Source, arguments: argparse.Namespace) -> Source:
-    """The scans with their intensities scaled, and with poses but for those of odometry.
+    """The scans with their intensities scaled, and with poses.
 
     Args:
         source: The scans.
@@ -165,16 +163,9 @@ def prepared(source: Source, arguments: argparse.Namespace) -> Source:
     Raises:
         InputError: Poses that cannot be read or do not fit the scans.
     """
-    if arguments.poses not in (None, ODOMETRY):
-        source = with_poses(source, arguments.poses)
-    return source.map(lambda frame: frame.with_intensity_times(arguments.intensity_scale))
-
-
-def odometry_of(arguments: argparse.Namespace) -> Placing | None:
-    """The odometry for the process that does a unit; None if poses are not to be computed."""
-    if arguments.poses != ODOMETRY:
-        return None
-    return partial(with_odometry, threads=arguments.threads)
+    return with_poses(source, arguments.poses).map(
+        lambda frame: frame.with_intensity_times(arguments.intensity_scale)
+    )
 
 
 def method_and_workers(
@@ -188,8 +179,7 @@ def method_and_workers(
         source: The scans.
         arguments: The options.
     """
-    block = len(source) if arguments.poses == ODOMETRY else arguments.block
-    workers = workers_of(arguments, lambda: len(spans_of(source, method, block)))
+    workers = workers_of(arguments, lambda: len(spans_of(source, method, arguments.block)))
     return (remake() if share_threads(arguments, workers) else method), workers
 
 

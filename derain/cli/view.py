@@ -9,7 +9,7 @@ sensor; or writes a recording for Rerun's viewer.
   derain view scan.bin --methods outdet.onnx --window
   derain view recording/ --methods default dsor --rerun out.rrd    then: rerun out.rrd
   derain view recording/ --card wads --frames ::10 --rerun out.rrd
-  derain view recording/ --methods persistence --poses odometry --frames 0:50 --rerun out.rrd
+  derain view recording/ --methods persistence --poses poses.txt --frames 0:50 --rerun out.rrd
   derain view drive.mcap/velodyne_points/000012 --out figure.png
 
 A method is a model (.onnx), parameters written by `derain tune` (.yaml), default or a filter
@@ -42,13 +42,13 @@ from derain.default import DEFAULT
 from derain.errors import InputError
 from derain.example import example_file, or_example
 from derain.export import methods
+from derain.recordings.posed import with_poses
 from derain.sources.bag_frame import NUMBER, BagFrame
 from derain.sources.folders import frame_of, named_frames
 from derain.sources.frame import Frame
 from derain.sources.recordings import irregularities
 from derain.system.extras import MATPLOTLIB, OPEN3D, require
 from derain.system.notices import Notices, warn
-from derain.workflows.odometry import placed
 
 
 def add_arguments(parser: Parser) -> None:
@@ -131,7 +131,7 @@ def _view_recording(arguments: argparse.Namespace) -> int:
         recordings=True,
         topic=arguments.topic,
     )
-    source = placed(found, arguments.poses, arguments.threads).map(
+    source = with_poses(found, arguments.poses).map(
         lambda frame: frame.with_intensity_times(arguments.intensity_scale)
     )
     from derain.pictures.selection import Labels, Selection

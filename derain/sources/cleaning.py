@@ -18,7 +18,6 @@ from derain.sources.method import Method
 from derain.sources.source import Source
 from derain.sources.stored_frame import StoredFrame
 from derain.sources.unit_cleaning import UnitCleaning
-from derain.sources.unit_judging import Placing
 from derain.sources.units import Division, folder_of_paths, units_of, whole
 from derain.sources.weather_monitor import WeatherMonitor, WeatherOptions
 from derain.views.scan_issues import MOST_RAIN, ScanIssue
@@ -85,7 +84,6 @@ def clean(
     method: Method,
     sink: CleanSink | Path | str,
     *,
-    placing: Placing | None = None,
     most_removed: float = MOST_RAIN,
     weather: WeatherOptions = WeatherOptions(),
     observer: CleaningObserver = CleaningObserver(),
@@ -105,9 +103,6 @@ def clean(
         source: A source; or one or more scans, frames, files and folders, in time order.
         method: A model, a filter, or a method that sees several scans.
         sink: Folder or URL to write to, or a sink with its options, opened by ``with``.
-        placing: Finds where the scans of whole recordings were taken, in the process that cleans
-            them, such as :func:`derain.recordings.posed.with_odometry`. None leaves the frames as
-            they are.
         most_removed: Scans with a greater share of rain in their valid points are not written.
         weather: Options for measuring the weather.
         observer: Follows the cleaning.
@@ -129,25 +124,21 @@ def clean(
         remedy = "Give derain.Derainer(...) or derain.FilterDerainer(...)."
         raise InputError("method", f"{type(method).__name__} is no method", remedy)
     source = source_of(source, results=[] if isinstance(sink, CleanSink) else [sink])
-    monitor = WeatherMonitor(weather, source, knows_recordings=placing is None)
+    monitor = WeatherMonitor(weather, source)
     cleaned: dict[str, CleanedScan] = {}  # by key
     failures: dict[str, InputError] = {}  # by text: that of a bag is the same for all its clouds
     before = 0
     with nullcontext(sink) if isinstance(sink, CleanSink) else CleanSink(sink, source) as opened:
-        finds_recordings = placing is not None and weather.every_scan
-        work = UnitCleaning(
-            method, "", placing, opened.destination, most_removed, monitor.sample, finds_recordings
-        )
+        work = UnitCleaning(method, "", opened.destination, most_removed, monitor.sample)
         is_read_from_store = any(isinstance(frame, StoredFrame) for frame in source)
         if executor is not None or is_read_from_store or opened.destination.is_stored:
             division = replace(division or Division(), keep_records=True)
         if division is not None and division.keeps_records(source, opened.destination.folder):
             work = replace(work, fingerprint=method.fingerprint())
-            block = division.block if placing is None else len(source)  # whole recordings
             job, units = division.begin(
                 opened.destination.folder,
                 _options(source, work, opened, division),
-                units_of(source, method, block),
+                units_of(source, method, division.block),
             )
             written_to = () if opened.destination.is_stored else (opened.folder,)
             task = Task(job, work, folder_of_paths(source, *written_to))

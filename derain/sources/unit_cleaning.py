@@ -77,15 +77,11 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
             on_judgement(judgement)
             return self._cleaned(frame, judgement, stopwatch, sink)
 
-        placed, doubts = self.placed(unit)
-        numbers = recording_numbers(placed.frames) if self.finds_recordings else {}
-        for outcome in self.results(placed, result):
+        numbers = recording_numbers(unit.frames) if self.finds_recordings else {}
+        for outcome in self.results(unit, result):
             key = outcome.frame.key
-            yield replace(
-                outcome,
-                issues=[*doubts.get(key, ()), *outcome.issues],
-                recording=f"{unit.id} {numbers[key]}" if key in numbers else None,
-            )
+            recording = f"{unit.id} {numbers[key]}" if key in numbers else None
+            yield replace(outcome, recording=recording)
         for frame, error in sink.finish_bags(unit.frames):
             yield self.failure(frame, error)
 

@@ -1,8 +1,8 @@
 """Judges the scans of one unit, and lists the options that its results depend on."""
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -15,13 +15,8 @@ from derain.sources.judging import AnswerOrError, answers
 from derain.sources.method import Method
 from derain.sources.units import FrameUnit, shared_options
 from derain.system.stopwatch import Stopwatch
-from derain.views.scan_issues import ScanIssue
 
 ResultT = TypeVar("ResultT", bound=Result)
-
-# Finds the poses of whole recordings: returns each frame with its pose, in order, and the issues of
-# the pose.
-Placing = Callable[[Sequence[Frame]], Iterable[tuple[Frame, Sequence[ScanIssue]]]]
 
 
 @dataclass(frozen=True)
@@ -31,12 +26,10 @@ class UnitJudging(Work[FrameUnit, ResultT]):
     Attributes:
         method: Method that judges them.
         fingerprint: That of the method where the job began.
-        placing: Finds the poses of the scans; None leaves them as they are.
     """
 
     method: Method
     fingerprint: str
-    placing: Placing | None
 
     def check(self) -> None:
         """Refuses a method that is another one here, such as a model's file that has changed."""
@@ -61,7 +54,7 @@ class UnitJudging(Work[FrameUnit, ResultT]):
         """Judges the scans of a unit, and makes a result of each.
 
         Args:
-            unit: The unit; its frames already have poses.
+            unit: The unit.
             result: Makes it of a frame, its judgement, and the times of the stages.
         """
         for frame, answer, stopwatch in self.judged(unit):
@@ -92,14 +85,6 @@ class UnitJudging(Work[FrameUnit, ResultT]):
             none = InputError(frame.name, "has no answer", "See the errors of the scans around it.")
             yield frame, none, Stopwatch()
 
-    def placed(self, unit: FrameUnit) -> tuple[FrameUnit, Mapping[str, Sequence[ScanIssue]]]:
-        """The unit with poses, and the issues of the poses, by the keys of the frames."""
-        if self.placing is None:
-            return unit, {}
-        placed = list(self.placing(unit.frames))
-        frames = tuple(frame for frame, _ in placed)
-        return replace(unit, frames=frames), {frame.key: odd for frame, odd in placed}
-
     def options(self, command: str, source: Sequence[Frame], block: int) -> dict[str, Any]:
         """The options that the answers depend on besides the scans, for the job of a command.
 
@@ -109,11 +94,9 @@ class UnitJudging(Work[FrameUnit, ResultT]):
             block: Scans of a block.
         """
         parameters = self.method.as_dict()
-        found = {} if self.placing is None else {"poses": "found from the scans"}
         return {
             **shared_options(command, source, block),
             **parameters,
             "method": Path(parameters["method"]).name,
             "content of the method": self.fingerprint,
-            **found,
         }

@@ -53,7 +53,6 @@ class WeatherMonitor:
     Args:
         options: Options for measuring it.
         source: The scans.
-        knows_recordings: True if the source shows which scans follow one another.
 
     Attributes:
         total: The weather of all measured scans together.
@@ -63,9 +62,7 @@ class WeatherMonitor:
         sample: Keys of the scans to measure; None measures every scan.
     """
 
-    def __init__(
-        self, options: WeatherOptions, source: Source, knows_recordings: bool = True
-    ) -> None:
+    def __init__(self, options: WeatherOptions, source: Source) -> None:
         self.total = ScanWeather.none()
         self.scans = 0
         self.scans_at = Counter[Level | None]()
@@ -73,8 +70,7 @@ class WeatherMonitor:
         self._alarm = options.new_alarm()
         self._recording: int | str = -1
         self._is_known = False  # whether any scan of the recording shows how far one sees
-        known = options.every_scan and knows_recordings
-        self._recordings = recording_numbers(source) if known else {}
+        self._recordings = recording_numbers(source) if options.every_scan else {}
         sampled = frozenset(frame.key for frame in evenly_spaced(source, SAMPLED_SCANS))
         self.sample = None if options.every_scan else sampled
         self._reaches: list[float] = []

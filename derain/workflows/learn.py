@@ -13,7 +13,7 @@ from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.files.atomic import require_writable, write_text
 from derain.models.checkpoint import load_model
-from derain.recordings.posed import STANDING
+from derain.recordings.posed import STANDING, with_poses
 from derain.sources.folders import named_frames
 from derain.sources.judging import Failures
 from derain.sources.method import Method
@@ -24,7 +24,6 @@ from derain.workflows.evaluation import beside_persistence, evaluate_student
 from derain.workflows.fit import fit, fit_options
 from derain.workflows.learn_config import PERSISTENCE, LearnConfig, Student, student_of
 from derain.workflows.learn_report import LEAST_RAIN, LearnResults, write_report
-from derain.workflows.odometry import placed
 from derain.workflows.progress import Show, Steps, show_nothing
 from derain.workflows.teaching import TeachResults, teach_recordings
 
@@ -79,7 +78,7 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
         found = named_frames(
             config.recordings, config.columns, labelled=True, recordings=True, topic=config.topic
         )
-        recording = placed(found, config.poses)
+        recording = with_poses(found, config.poses)
         taught = _teach(config, teacher, recording, steps, warnings)
         data = Taught(str(config.taught))
         # Scans suit persistence, another teacher, where this one sees several at a time.

@@ -14,13 +14,12 @@ from derain.errors import InputError
 from derain.files.atomic import require_writable
 from derain.files.reading import is_file
 from derain.recordings.odometry import FrameOdometry, Registration
-from derain.recordings.posed import ODOMETRY, with_odometry, with_poses
 from derain.sources.frame import Frame, times_of
 from derain.sources.judging import Guard, unguarded
 from derain.sources.recordings import recordings_of
-from derain.sources.source import Frames, Source
+from derain.sources.source import Source
 from derain.sources.trajectory import write_trajectory
-from derain.system.notices import Notices, warn
+from derain.system.notices import warn
 from derain.system.stopwatch import Stopwatch
 
 # Receives the registration of each scan as soon as it is found, and the times of its stages.
@@ -102,7 +101,7 @@ def find_poses(
     times = [times_of(recording) or [] for recording in recordings]
     odometry = FrameOdometry(threads)
     found = []
-    with tqdm(total=len(source), desc=ODOMETRY, unit="scan", disable=None) as bar:
+    with tqdm(total=len(source), desc="odometry", unit="scan", disable=None) as bar:
         for file, recording, seconds in zip(files, recordings, times, strict=True):
             registrations = []
             for frame in recording:
@@ -115,34 +114,6 @@ def find_poses(
                 poses = replaced(poses, fault=error)
             found.append(poses)
     return found
-
-
-def placed(source: Source, poses: str | None, threads: int = 0) -> Source:
-    """The same frames with poses; warns of scans that odometry cannot register.
-
-    Args:
-        source: The frames.
-        poses: As :func:`derain.recordings.posed.with_poses` takes it, or ``odometry``. None leaves
-            the frames as they are: a method that needs poses takes those beside the scans, or finds
-            them itself.
-        threads: Threads of odometry; 0 takes every core.
-
-    Raises:
-        InputError: Poses that cannot be read or do not fit the scans.
-    """
-    if poses is None:
-        return source
-    if poses != ODOMETRY:
-        return with_poses(source, poses)
-    notices = Notices()
-    posed: list[Frame] = []
-    registered = with_odometry(source, threads)
-    bar = tqdm(registered, total=len(source), desc=ODOMETRY, unit="scan", disable=None)
-    for frame, issues in bar:
-        notices.warn(frame.name, issues)
-        posed.append(frame)
-    notices.warn_of_repeats()
-    return Frames(posed)
 
 
 def _register(frame: Frame, odometry: FrameOdometry, guard: Guard, watch: Watch) -> Registration:

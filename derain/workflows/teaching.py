@@ -12,7 +12,6 @@ from derain.sources.judging import Guard, unguarded
 from derain.sources.method import Method
 from derain.sources.recordings import irregularities
 from derain.sources.source import Source
-from derain.sources.unit_judging import Placing
 from derain.sources.units import Division
 from derain.system.notices import Notices, warn
 
@@ -49,7 +48,6 @@ def teach_recordings(
     watch: Watch = lambda scan: None,
     division: Division | None = None,
     executor: Submits | None = None,
-    placing: Placing | None = None,
 ) -> TeachResults:
     """Labels recordings by a method, and warns where a network could learn little from the labels.
 
@@ -62,7 +60,6 @@ def teach_recordings(
         watch: Receives each scan.
         division: Division of the scans into units; see :func:`derain.annotation.teach.teach`.
         executor: Does the units; None does them in this process.
-        placing: Finds where the scans were taken; see :func:`derain.annotation.teach.teach`.
 
     Raises:
         InputError: As for :func:`derain.annotation.teach.teach`.
@@ -81,7 +78,7 @@ def teach_recordings(
             record.add_cells(scan.truth)
         watch(scan)
 
-    manifest = teach(method, source, out, card, guard, count, division, executor, placing)
+    manifest = teach(method, source, out, card, guard, count, division, executor)
     notices.warn_of_repeats()
     results = TeachResults(manifest, judged, counts, record)
     if division is None or division.shard is None:

@@ -80,16 +80,16 @@ def test_processes_in_another_folder_do_what_is_in_a_store(s3, drive, tmp_path) 
     assert len(in_store(s3, "out")) == 2 * SCANS
 
 
-@pytest.mark.parametrize(("storage", "poses"), [("mcap", "poses.txt"), ("ros1", "odometry")])
+@pytest.mark.parametrize(("storage", "posed"), [("mcap", True), ("ros1", False)])
 def test_a_bag_of_a_store_is_cleaned_as_one_of_a_folder(
-    succeed, s3, drive, tmp_path, storage, poses
+    succeed, s3, drive, tmp_path, storage, posed
 ) -> None:
     (tmp_path / "bags").mkdir()
     small_bag(tmp_path / "bags", storage)
     s3.put(f"{tmp_path / 'bags'}/", f"{BUCKET}/bags/", recursive=True)
     trajectory = drive / "poses.txt"
     trajectory.write_text("\n".join(trajectory.read_text().splitlines()[:3]))
-    options = (*OPTIONS, "--poses", trajectory if poses == "poses.txt" else poses)
+    options = (*OPTIONS, "--poses", trajectory) if posed else OPTIONS
     local, table = tmp_path / "local.csv", tmp_path / "stored.csv"
     bag = tmp_path / "bags"
     succeed("run", "persistence", bag, "--out", tmp_path / "out", *options, "--weather", local)
@@ -101,7 +101,7 @@ def test_a_bag_of_a_store_is_cleaned_as_one_of_a_folder(
     assert in_store(s3, "out") == contents(tmp_path / "out")
     assert "s3://drives/bags/drive" in first.out.splitlines()[0]
     assert "3 scans (3 of them done before)" in again.out
-    if poses == "poses.txt":
+    if posed:
         trajectory.write_text(trajectory.read_text().replace("0.3", "0.4"))
         assert "done before" not in succeed(*command, "--weather", table).out
 

@@ -1,21 +1,17 @@
-"""Frames get their poses from a file or from odometry, or stand."""
+"""Frames get their poses from a file, or stand."""
 
-from collections.abc import Iterable
 from dataclasses import replace
-from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from derain.errors import InputError
 from derain.files import write_scan
-from derain.recordings.odometry import FrameOdometry, shift_of
-from derain.recordings.posed import with_odometry, with_poses
+from derain.recordings.odometry import FrameOdometry
+from derain.recordings.posed import with_poses
 from derain.scan import Scan
-from derain.sources.file_frame import FileFrame
 from derain.sources.folders import named_frames
-from derain.sources.frame import Frame, MemoryFrame
+from derain.sources.frame import MemoryFrame
 from derain.sources.source import Frames
 
 from .street import motion, scan_from
@@ -43,39 +39,16 @@ def lines(ahead: list[float]) -> str:
     return "".join(f"1 0 0 {x} 0 1 0 0 0 0 1 0\n" for x in ahead)
 
 
-def by_odometry(source: Iterable[Frame]) -> list[Frame]:
-    return [frame for frame, _ in with_odometry(list(source))]
-
-
-def test_odometry_gives_poses(drive) -> None:
-    posed = by_odometry(drive)
-    assert [frame.key for frame in posed] == [frame.key for frame in drive]
-    for number, frame in enumerate(posed):
-        error = np.linalg.inv(np.linalg.matrix_power(STEP, number)) @ frame.pose
-        assert shift_of(error) < 0.05
-    assert all(later.follows(earlier) for earlier, later in pairwise(posed))
-
-
-def test_each_recording_starts_at_the_identity(drive) -> None:
+def test_a_sensor_at_rest_is_at_the_identity() -> None:
+    drive = Frames.of_scans([Scan(np.ones((1, 3)))] * 2)
     assert all((frame.pose == np.eye(4)).all() for frame in with_poses(drive, "standing"))
-    twice = [*drive, *(replace(frame, sequence="again") for frame in drive)]
-    posed = by_odometry(twice)
-    for number in range(4):
-        np.testing.assert_array_equal(posed[number].pose, posed[number + 4].pose)
 
 
-@pytest.mark.parametrize("unread", [True, False])
-def test_no_window_reaches_over_a_scan_that_cannot_be_registered(drive, unread) -> None:
-    bad = replace(drive[1], scan=Scan.of(np.zeros((0, 3))))
-    if unread:
-        bad = FileFrame(key="1", sequence="drive", number=1, path=Path("absent.bin"))
-    registered = list(with_odometry([drive[0], bad, *drive[2:]]))
-    posed = [frame for frame, _ in registered]
-    following = [later.follows(earlier) for earlier, later in pairwise(posed)]
-    assert following == [False, False, True]
-    assert posed[3].pose[0, 3] == pytest.approx(1.3, abs=0.1)
-    reason = "cannot be read" if unread else "only 0 surfaces in reach"
-    assert reason in registered[1][1][0].detail
+def test_the_word_odometry_is_refused_with_what_to_do_instead() -> None:
+    drive = Frames.of_scans([Scan(np.ones((1, 3)))])
+    assert with_poses(drive, None) is drive
+    with pytest.raises(InputError, match=r"--poses: odometry.*derain odometry .*--out p\.txt"):
+        with_poses(drive, "odometry")
 
 
 def test_a_scan_taken_before_the_one_that_it_follows_is_not_trusted(drive) -> None:
@@ -133,13 +106,6 @@ def test_poses_of_another_length_are_refused(scans, tmp_path, count) -> None:
         with_poses(named, path)
 
 
-def test_gaps_of_one_part_do_not_close_up_to_the_next(drive) -> None:
-    blind = [replace(frame, scan=Scan.of(np.zeros((0, 3)))) for frame in drive[:3]]
-    later = replace(drive[3], number=5)  # two scans of the sequence are missing before it
-    posed = by_odometry([*blind, later])
-    assert not any(after.follows(before) for before, after in pairwise(posed))
-
-
 def test_poses_that_go_by_lines_ask_for_no_times(drive, tmp_path) -> None:
     for number, frame in enumerate(drive[:2]):
         write_scan(tmp_path / f"a/{number}.pcd", frame.read())
@@ -147,4 +113,3 @@ def test_poses_that_go_by_lines_ask_for_no_times(drive, tmp_path) -> None:
     (tmp_path / "mine.txt").write_text(lines([4, 5]))
     frames = named_frames([tmp_path / "a"])
     assert x_of(with_poses(frames, tmp_path / "mine.txt")) == [4, 5]
-    assert by_odometry(frames)[1].pose[0, 3] == pytest.approx(1.3, abs=0.05)

@@ -18,7 +18,6 @@ from derain.evaluation.hard_cases import scene
 from derain.export.recorded import RecordedDerainer
 from derain.jobs.shard import Shard
 from derain.jobs.workers import WorkerPool
-from derain.recordings.posed import with_odometry
 from derain.sources.clean_sink import CleanSink, Destination
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
@@ -120,7 +119,7 @@ def test_each_scan_of_a_unit_has_one_outcome_whichever_fail(
     method = Failing(Window(past, delay), bad)
     out = Destination("out", None, CleanSink)
     for unit in units_of(recording, method, block):
-        outcomes = list(UnitCleaning(method, "", None, out, 1.0, None).judged(unit))
+        outcomes = list(UnitCleaning(method, "", out, 1.0, None).judged(unit))
         assert [frame for frame, _, _ in outcomes] == list(unit.frames)  # each when it is met
         errors = {frame: each for frame, each, _ in outcomes if isinstance(each, derain.InputError)}
         assert all(error.subject == frame.name for frame, error in errors.items())
@@ -128,22 +127,18 @@ def test_each_scan_of_a_unit_has_one_outcome_whichever_fail(
         assert failed == bad & {frame.number for frame in unit.frames}
 
 
-def test_odometry_in_units_is_that_of_the_whole_source(drive, tmp_path) -> None:
+def test_poses_that_units_find_are_those_of_one_run(drive, tmp_path) -> None:
     for poses in drive.rglob("poses.txt"):
         poses.unlink()
     source, method = derain.named_frames(drive), derain.PersistenceDerainer(threads=1)
     out, every = tmp_path / "units", WeatherOptions(every_scan=True)
-    before = derain.Frames(frame for frame, _ in with_odometry(source, threads=1))
-    whole = clean(before, method, tmp_path / "whole", weather=every)
-    assert any(one.number != other.number for one, other in zip(before, source, strict=True))
+    whole = clean(source, method, tmp_path / "whole", weather=every)
     units = Division(2, keep_records=True)
-    for each in (None, units, units):
-        report = clean(source, method, out, placing=with_odometry, weather=every, division=each)
+    for _ in range(2):
+        report = clean(source, method, out, weather=every, division=units)
         assert contents(tmp_path / "whole") == contents(out)
         assert [scan.weather for scan in report.scans] == [scan.weather for scan in whole.scans]
     assert report.before == SCANS  # and not those of the recording of which a scan failed
-    with pytest.raises(derain.InputError, match="poses was found from the scans"):
-        clean(source, method, out, weather=every, division=units)
 
 
 def test_other_poses_are_other_inputs(drive) -> None:
