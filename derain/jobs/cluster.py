@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-import derain
 from derain.errors import InputError
 from derain.jobs.running import Submits
 from derain.system.extras import DISTRIBUTED
@@ -65,32 +64,20 @@ def _address(named: str) -> str:
     return address
 
 
-def version() -> str:
-    """The version of derain in the process that calls this."""
-    return derain.__version__
-
-
 def _refuse_other_versions(client: Any) -> None:
     """Refuses workers on which derain is another one than here, or none.
 
     Workers that join later are checked with their first unit.
     """
-    try:
-        versions = set(client.run(version).values())
-    except Exception as error:  # Dask keeps only the text of the original error
-        if "No module named" not in str(error):
-            raise
-        reason = f"its workers cannot import derain ({error})"
-        raise InputError("--dask", reason, _INSTALL) from error
-    if not versions:
+    versions = client.get_versions(packages=["derain"])
+    workers = versions["workers"].values()
+    if not workers:
         warn("--dask: the scheduler has no workers yet; scans wait for them")
-    if others := versions - {derain.__version__}:
+    here = versions["client"]["packages"]["derain"]
+    others = {str(each["packages"]["derain"]) for each in workers} - {str(here)}
+    if others:
         raise InputError(
             "--dask",
-            f"its workers have derain {', '.join(sorted(others))}, and this command "
-            f"{derain.__version__}",
-            _INSTALL,
+            f"this command has derain {here}, and its workers have {', '.join(sorted(others))}",
+            "Install the same version of derain on all of them.",
         )
-
-
-_INSTALL = "Install the same version of derain on all of them."

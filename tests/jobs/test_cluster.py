@@ -1,5 +1,7 @@
 """A Dask cluster as an executor, and schedulers that are not there."""
 
+from typing import Any
+
 import pytest
 from jobs.counting import Counting
 
@@ -33,3 +35,18 @@ def test_a_scheduler_that_is_not_there_is_one_line(tmp_path) -> None:
     for address in ("tcp://127.0.0.1:9", "nowhere", str(tmp_path / "scheduler.json")):
         with pytest.raises(InputError, match="no scheduler answers at"), dask_executor(address):
             pass
+
+
+@pytest.mark.parametrize("version", ["0.1.9", None])
+def test_workers_with_another_derain_or_none_are_one_line(monkeypatch, version) -> None:
+    def versions(client: distributed.Client, packages: list[str]) -> dict[str, Any]:
+        of_worker = {"tcp://worker:1": {"packages": dict.fromkeys(packages, version)}}
+        return {"client": {"packages": dict.fromkeys(packages, "9.0")}, "workers": of_worker}
+
+    monkeypatch.setattr(distributed.Client, "get_versions", versions)
+    with (
+        distributed.LocalCluster(n_workers=0, protocol="tcp://", dashboard_address=None) as cluster,
+        pytest.raises(InputError, match=rf"--dask: .*9\.0.*{version}.*Install the same version"),
+        dask_executor(cluster.scheduler_address),
+    ):
+        pass
