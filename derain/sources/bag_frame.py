@@ -68,7 +68,7 @@ class BagFrame(FileFrame):
 
     def fingerprint(self) -> str:
         """First 16 hexadecimal digits of the SHA-256 of its message."""
-        return self._checksum()[:16]
+        return sha256(self.clouds.message(self.cloud_number).data).hexdigest()[:16]
 
     def size(self) -> int:
         """Bytes of its share of the bag."""
@@ -81,9 +81,6 @@ class BagFrame(FileFrame):
         place = [self.clouds.topic.name, str(self.cloud_number)]
         stamps = map(stamp_of, files_of(self.clouds.bag.path))
         return " ".join([*stamps, *place]) + self._label_stamp()
-
-    def _checksum(self) -> str:
-        return sha256(self.clouds.message(self.cloud_number).data).hexdigest()
 
 
 def bag_frames(path: Path, labelled: bool = False, prefix: str = "") -> list[BagFrame]:

@@ -13,7 +13,6 @@ from derain.jobs.running import Submits, Task, run
 from derain.sources.clean_sink import CleanSink
 from derain.sources.cleaned_scan import CleanedScan, ScanOutcome, counts
 from derain.sources.folders import GivenScans, source_of
-from derain.sources.judgement import Judgement
 from derain.sources.method import Method
 from derain.sources.source import Source
 from derain.sources.stored_frame import StoredFrame
@@ -62,9 +61,6 @@ class CleanReport:
 
 class CleaningObserver:
     """Follows a cleaning while it runs. A subclass prints or records; this one does nothing."""
-
-    def judged(self, judgement: Judgement) -> None:
-        """Called for each judged scan before it is written, where no records are kept."""
 
     def noticed(self, scan: str, odd: list[ScanIssue]) -> None:
         """Called for each judged scan with warnings about it."""
@@ -145,7 +141,7 @@ def clean(
             outcomes, in_units = run(task, units, executor), True
         else:
             units = [whole(source)]
-            cleaning = work.clean(units[0], opened, observer.judged)
+            cleaning = work.clean(units[0], opened)
             outcomes = ((units[0], outcome, False) for outcome in cleaning)
             in_units = False
         scans = sum(len(unit.frames) for unit in units)

@@ -8,7 +8,7 @@ from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS, count_points, read_scan
 from derain.files.labels import read_labels
 from derain.files.names import scan_stem
-from derain.files.reading import file_size, is_file, read_bytes, reading, stamp_of
+from derain.files.reading import file_size, is_file, reading, stamp_of
 from derain.scan import Floats, Ints, Scan, class_ids
 from derain.sources.frame import Frame
 from derain.sources.records import Records
@@ -83,10 +83,6 @@ class FileFrame(Frame):
                 ends += file.read(ENDS)
         return sha256(size.to_bytes(8, "little") + ends).hexdigest()[:16]
 
-    def checksums(self) -> tuple[str, str | None]:
-        """SHA-256 of its file and of that of its labels, in hexadecimal digits."""
-        return self._checksum(), _sha256(self.label_path) if self.label_path else None
-
     def size(self) -> int:
         """Bytes of its file."""
         with reading(self.path):
@@ -100,11 +96,3 @@ class FileFrame(Frame):
     def _label_stamp(self) -> str:
         labels = self.label_path
         return f" {stamp_of(labels)}" if labels is not None and is_file(labels) else ""
-
-    def _checksum(self) -> str:
-        return _sha256(self.path)
-
-
-def _sha256(path: Path) -> str:
-    with reading(path):
-        return sha256(read_bytes(path, file_size(path))).hexdigest()

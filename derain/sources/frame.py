@@ -122,17 +122,9 @@ class Frame(ABC):
             InputError: A file that cannot be read.
         """
 
+    @abstractmethod
     def fingerprint(self) -> str:
         """A fingerprint of its points, 16 hexadecimal digits.
-
-        Raises:
-            InputError: A file that cannot be read.
-        """
-        return self.checksums()[0][:16]
-
-    @abstractmethod
-    def checksums(self) -> tuple[str, str | None]:
-        """SHA-256 of the scan and of its labels, where it has any, in hexadecimal digits.
 
         Raises:
             InputError: A file that cannot be read.
@@ -228,13 +220,11 @@ class MemoryFrame(Frame):
         """Number of points of the scan."""
         return len(self.scan)
 
-    def checksums(self) -> tuple[str, str | None]:
-        """SHA-256 of coordinates and intensities, and of the labels, in hexadecimal digits."""
+    def fingerprint(self) -> str:
+        """First 16 hexadecimal digits of the SHA-256 of its coordinates and intensities."""
         columns = (self.scan.xyz, self.scan.intensity)
         points = b"".join(np.ascontiguousarray(c).tobytes() for c in columns if c is not None)
-        label = self.scan.label if self.has_labels else None
-        of_label = None if label is None else sha256(label.astype("<i8").tobytes()).hexdigest()
-        return sha256(points).hexdigest(), of_label
+        return sha256(points).hexdigest()[:16]
 
     def size(self) -> int:
         """Bytes of its coordinates."""

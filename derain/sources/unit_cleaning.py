@@ -1,7 +1,8 @@
 """Cleans the scans of one unit: judges them, measures their weather, and writes them."""
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from derain.errors import InputError
@@ -19,9 +20,6 @@ from derain.sources.weather_monitor import SAMPLED_SCANS, recording_numbers
 from derain.stores.url import path_of
 from derain.system.stopwatch import Stopwatch
 from derain.views.scan_issues import HEAVIEST_RAIN, left_out, much_removed, no_points
-
-# Receives the judgement of each scan before it is written.
-OnJudgement = Callable[[Judgement], None]
 
 
 @dataclass(frozen=True)
@@ -58,27 +56,19 @@ class UnitCleaning(UnitJudging[ScanOutcome]):
             held[-1] = replace(held[-1], uploaded=uploaded)
         yield from held
 
-    def clean(
-        self, unit: FrameUnit, sink: CleanSink, on_judgement: OnJudgement = lambda judgement: None
-    ) -> Iterator[ScanOutcome]:
+    def clean(self, unit: FrameUnit, sink: CleanSink) -> Iterator[ScanOutcome]:
         """Cleans the scans of a unit and writes them to an open sink.
 
         Args:
             unit: The unit.
             sink: The file or folder to write to.
-            on_judgement: Receives each judgement.
 
         Yields:
             Outcomes of all scans; then, of a bag that could not be written, failures of all its
             clouds.
         """
-
-        def result(frame: Frame, judgement: Judgement, stopwatch: Stopwatch) -> ScanOutcome:
-            on_judgement(judgement)
-            return self._cleaned(frame, judgement, stopwatch, sink)
-
         numbers = recording_numbers(unit.frames) if self.finds_recordings else {}
-        for outcome in self.results(unit, result):
+        for outcome in self.results(unit, partial(self._cleaned, sink=sink)):
             key = outcome.frame.key
             recording = f"{unit.id} {numbers[key]}" if key in numbers else None
             yield replace(outcome, recording=recording)

@@ -21,4 +21,4 @@ class UnreadableBag(FileFrame):
     def _fail(self, *_: Any, **__: Any) -> NoReturn:
         raise self.error
 
-    read = read_label = count_points = fingerprint = checksums = require_labels = _fail
+    read = read_label = count_points = fingerprint = require_labels = _fail

@@ -296,7 +296,7 @@ class Counting(ValueWork[FrameUnit]):
     rain_rates: Mapping[str, float]
 
     def value(self, unit: FrameUnit) -> dict[str, Any]:
-        """The counts of each method, where scans do not suit one, and the checksums of the files.
+        """The counts of each method, where scans do not suit one, and fingerprints of the scans.
 
         Raises:
             InputError: A scan that cannot be read.
@@ -311,10 +311,7 @@ class Counting(ValueWork[FrameUnit]):
 
         rates = [self.rain_rates.get(frame.sequence) for frame in unit.frames]
         scored = score(self._ready, scans(), self.reader.card, self.reader.distinct, rates)
-        files = []
-        for frame in unit.frames:
-            of_scan, of_label = frame.checksums()
-            files.append({"scan": frame.name, "sha256": of_scan, "label_sha256": of_label})
+        files = [{"scan": frame.name, "fingerprint": frame.fingerprint()} for frame in unit.frames]
         counts = [scores.to_json() for scores in scored]
         return {"counts": counts, "issues": issues, "files": files}
 

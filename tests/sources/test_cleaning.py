@@ -10,7 +10,6 @@ import derain
 from derain.files.labels import read_labels
 from derain.sources.cleaned_scan import ScanOutcome
 from derain.sources.cleaning import CleaningObserver
-from derain.sources.judgement import Judgement
 
 
 class Recorder(CleaningObserver):
@@ -18,9 +17,6 @@ class Recorder(CleaningObserver):
 
     def __init__(self) -> None:
         self.calls: list[tuple[str, str]] = []
-
-    def judged(self, judgement: Judgement) -> None:
-        self.calls.append(("judged", Path(judgement.scan.name).name))
 
     def cleaned(self, outcome: ScanOutcome) -> None:
         self.calls.append(("cleaned", Path(outcome.frame.name).name))
@@ -34,10 +30,7 @@ def test_a_scan_that_cannot_be_read_is_reported_and_the_others_are_cleaned(tmp_p
     (scans / "1.bin").write_bytes(b"broken")
     dror, recorder = derain.FilterDerainer(derain.DROR()), Recorder()
     report = derain.clean(scans, dror, out, most_removed=1, observer=recorder)
-    assert recorder.calls == [
-        *[("judged", "0.bin"), ("cleaned", "0.bin"), ("failed", "1.bin")],
-        *[("judged", "2.bin"), ("cleaned", "2.bin")],
-    ]
+    assert recorder.calls == [("cleaned", "0.bin"), ("failed", "1.bin"), ("cleaned", "2.bin")]
     assert [Path(str(error.subject)).name for error in report.failures] == ["1.bin"]
     assert str(report).startswith("2 scans, 1 not cleaned: 400 points")
     assert {path.name for path in out.iterdir()} == {"0.bin", "0.label", "2.bin", "2.label"}

@@ -2,7 +2,6 @@
 
 import pickle
 from dataclasses import replace
-from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -50,7 +49,7 @@ def test_labels_that_are_not_to_be_read_do_not_count(labelled) -> None:
     for frame in (labelled, memory):
         bare = frame.without_labels()
         assert (frame.has_labels, bare.has_labels) == (True, False)
-        assert bare.checksums() == (frame.checksums()[0], None)
+        assert bare.fingerprint() == frame.fingerprint()
     with pytest.raises(InputError, match="it has no labels"):
         labelled.without_labels().read_label(50)
 
@@ -85,13 +84,6 @@ def test_fingerprints_of_files_differ_by_their_ends(tmp_path) -> None:
     assert frame_of(tmp_path / "copy.bin").fingerprint() in prints
 
 
-def test_checksums_are_those_that_everybody_computes(labelled, tmp_path) -> None:
-    names = ("scan.bin", "scan.label")
-    assert labelled.checksums() == tuple(
-        sha256((tmp_path / name).read_bytes()).hexdigest() for name in names
-    )
-
-
 def test_a_given_pose_goes_before_the_record_beside_the_scan(labelled) -> None:
     (labelled.path.parent / "poses.txt").write_text("damaged")
     pose = np.eye(4)
@@ -118,7 +110,6 @@ def test_a_scan_in_memory_is_a_frame_like_any(labelled) -> None:
     brighter = replace(scan, intensity=scan.intensity + 1)
     other = MemoryFrame(key="0", scan=brighter)
     assert other.fingerprint() != frame.fingerprint()
-    assert other.checksums()[1] == frame.checksums()[1]
 
 
 def test_a_source_can_be_gone_through_again() -> None:
