@@ -63,7 +63,7 @@ from derain.export.methods import DELAY, PAST, over_recording
 from derain.export.runtime import Derainer
 from derain.files.labels import LABEL
 from derain.sources.bag_frame import BagFrame
-from derain.sources.clean_sink import CleanSink, require_probabilities
+from derain.sources.clean_sink import CleanSink
 from derain.sources.cleaned_bags import RAIN_PROBABILITY, BagOptions
 from derain.sources.cleaned_scan import ScanOutcome
 from derain.sources.cleaning import CleaningObserver, CleanReport, clean
@@ -142,8 +142,13 @@ def main(arguments: argparse.Namespace) -> int:
     results = [folder for folder in (arguments.out, arguments.removed) if folder is not None]
     frames = frames_at(scans, arguments.columns, arguments.topic, results)
     source = unit_options.prepared(frames, arguments)
-    if arguments.probability:
-        require_probabilities(single_scan_method, source)
+    if arguments.probability and not single_scan_method.gives_probabilities:
+        raise InputError(
+            "--probability",
+            f"{single_scan_method.as_dict()['method']} returns which points are rain, without "
+            "probabilities",
+            "Leave it out, or take a model or persistence.",
+        )
     # The number of clouds of a bag in a store is known only after fetching it.
     several = len(source) > 1 or isinstance(source[0], StoredBag)
     method, workers = unit_options.method_and_workers(

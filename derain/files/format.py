@@ -67,13 +67,6 @@ class Format(ABC):
             InputError: A scan that the format cannot hold.
         """
 
-    def names_columns(self, scan: Scan) -> bool:
-        """True if a file that a scan is written to names its columns.
-
-        A further column in one that does not would be taken for something else by who reads it.
-        """
-        return True
-
     def count(self, path: Path, columns: Sequence[str]) -> int | None:
         """Number of points of an uncompressed file, if its size determines it, else None.
 

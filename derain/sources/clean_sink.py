@@ -12,15 +12,13 @@ from derain.errors import InputError
 from derain.files import write_scan
 from derain.files.atomic import require_writable_folder
 from derain.files.columns import with_column
-from derain.files.format import format_of
 from derain.files.labels import LABEL
-from derain.scan import Scan
+from derain.files.names import scan_suffix
 from derain.sources.bag_frame import BagFrame
 from derain.sources.cleaned_bags import RAIN_PROBABILITY, BagOptions, CleanedBags
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
-from derain.sources.method import Method
 from derain.sources.search import mark_as_results
 from derain.sources.sink import FolderSink
 from derain.sources.source import Source
@@ -28,6 +26,9 @@ from derain.sources.stored_frame import StoredBag
 from derain.stores.mirror import uploaded
 from derain.stores.objects import stamps_at
 from derain.stores.url import Place, is_url, is_web, path_of, url_of, without_secrets
+
+# Files whose columns have no names: a further one would be taken for something else.
+NAMELESS = (".bin", ".npy")
 
 
 class CleanSink:
@@ -52,7 +53,8 @@ class CleanSink:
 
     Raises:
         InputError: The folder holds files that must not be overwritten, two scans have one name, or
-            options that contradict each other; in the block, a folder that cannot be written.
+            options that contradict each other or the scans; in the block, a folder that cannot be
+            written.
 
     Attributes:
         folder: Folder to write to, or the path that stands for its URL.
@@ -88,6 +90,8 @@ class CleanSink:
         self._files.refuse_clashes(source)
         self._bags = CleanedBags(self.folder, source, bags, probability)
         self._refuse_files_in_bags()
+        if probability:
+            self._refuse_nameless()
         if self._removed is not None:
             self._refuse_removed(self._removed)
         self._written = self._written_for_it = 0
@@ -131,7 +135,9 @@ class CleanSink:
         if self._bags.takes(frame):
             self._bags.write(judgement)
             return
-        scan = _with_probability(frame, judgement) if self.probability else judgement.scan
+        scan = judgement.scan
+        if self.probability:
+            scan = with_column(scan, RAIN_PROBABILITY, judgement.probability)
         if self._removed is not None:
             write_scan(self._removed.scan_path(frame), scan.take(rain))
         self._files.write(frame, scan.take(~rain), rain)
@@ -190,6 +196,16 @@ class CleanSink:
                 raise InputError("--removed", reason, "Give --removed-topic NAME.")
             if isinstance(frame, FileFrame):
                 removed.refuse_own_scan(frame)
+
+    def _refuse_nameless(self) -> None:
+        """Refuses a file in which the column of probabilities would have no name."""
+        for frame in self._source:
+            if frame.suffix and scan_suffix(Path(frame.name)) in NAMELESS:
+                raise InputError(
+                    frame.name,
+                    f"the columns of such a file have no names, so none can be {RAIN_PROBABILITY}",
+                    "Leave --probability out, or convert the scans, to .pcd or .npz for instance.",
+                )
 
     def _refuse_files_in_bags(self) -> None:
         """Refuses a scan in a file whose result would be in the folder of a bag's copy."""
@@ -267,32 +283,6 @@ class Destination:
         return all(path.exists() or is_url(url_of(path)) for path in sink.targets())
 
 
-def require_probabilities(method: Method, source: Source) -> None:
-    """Refuses a method without probabilities, and files that cannot name a column.
-
-    It reads the first file of each format.
-
-    Args:
-        method: The method.
-        source: The scans.
-
-    Raises:
-        InputError: The method has no probabilities, or a file does not name its columns.
-    """
-    if not method.gives_probabilities:
-        raise InputError(
-            "--probability",
-            f"{method.as_dict()['method']} returns which points are rain, without probabilities",
-            "Leave it out, or take a model or persistence.",
-        )
-    for frame in {frame.suffix: frame for frame in reversed(source)}.values():
-        try:
-            scan = frame.read()
-        except InputError:  # reported when its turn comes
-            continue
-        _refuse_nameless(frame, scan)
-
-
 def _path_of(place: Place) -> Path:
     """The path of a folder, or the one that stands for its URL.
 
@@ -306,23 +296,3 @@ def _path_of(place: Place) -> Path:
             "Name a folder, or a URL such as s3://bucket/cleaned.",
         )
     return path_of(str(place)) if is_url(place) else Path(place)
-
-
-def _with_probability(frame: Frame, judgement: Judgement) -> Scan:
-    """The judged scan with the column, in place of one of this name.
-
-    Raises:
-        InputError: Its file does not name its columns.
-    """
-    _refuse_nameless(frame, judgement.scan)
-    return with_column(judgement.scan, RAIN_PROBABILITY, judgement.probability)
-
-
-def _refuse_nameless(frame: Frame, scan: Scan) -> None:
-    """Refuses a file in which a further column would have no name."""
-    if frame.suffix and not format_of(Path(frame.name)).names_columns(scan):
-        raise InputError(
-            frame.name,
-            f"the columns of such a file have no names, so that none can be {RAIN_PROBABILITY}",
-            "Leave --probability out, or convert the scans, to .pcd or .npz for instance.",
-        )

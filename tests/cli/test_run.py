@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from recorded_scenes import write_scenes
 
+import derain
 from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
 from derain.files import read_scan, write_scan
@@ -139,6 +140,14 @@ def test_parameters_come_from_a_file_and_one_by_one(succeed, tmp_path) -> None:
     assert called("dsor", "--parameters", tuned, *more) == expected
     paper = FilterDerainer(DROR(variant="paper", azimuth_resolution=1.0))(scene(400)).tolist()
     assert called("dror", "--set", "variant=paper", "--set", "azimuth_resolution=1") == paper
+
+
+@pytest.mark.parametrize("name", ["scan.npy", "scan.bin.gz"])
+def test_a_file_without_names_of_columns_takes_no_probability(tmp_path, name) -> None:
+    write_scan(tmp_path / name, scene(30))
+    source = derain.named_frames(tmp_path / name)
+    with pytest.raises(derain.InputError, match=r"scan\.\S+: .*have no names.*\.pcd or \.npz"):
+        derain.CleanSink(tmp_path / "out", source, probability=True)
 
 
 @pytest.mark.parametrize("suffix", [".pcd", ".npz", ".csv"])

@@ -93,10 +93,6 @@ class Binary(Format):
         rows, rest = divmod(size, row)
         return None if rest else rows
 
-    def names_columns(self, scan: Scan) -> bool:
-        """False: the reader has to name them."""
-        return False
-
     def encode(self, path: Path, scan: Scan) -> bytes:
         """A scan's columns as rows of float32, or of float64 if the scan comes from such a file.
 

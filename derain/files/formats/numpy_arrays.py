@@ -77,10 +77,6 @@ class Npy(Format):
         header = NpyHeader(bool(array.dtype.names), _fields_as_columns(array))
         return scan_of(content.path, fields, shape, header)
 
-    def names_columns(self, scan: Scan) -> bool:
-        """A structured array does."""
-        return isinstance(scan.header, NpyHeader) and scan.header.structured
-
     def encode(self, path: Path, scan: Scan) -> bytes:
         """A scan's columns as one array.
 
