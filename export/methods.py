@@ -14,12 +14,15 @@ from derain.files.documents import Entry
 from derain.files.reading import is_file
 from derain.filters import FILTERS, FilterDerainer, filter_from
 from derain.filters.derainer import CANDIDATES
-from derain.recordings.recording_method import METHODS
 from derain.sources.method import Method
+from derain.system.registry import from_parameters
 from derain.views.candidates import candidates_at
 
 PARAMETER_SUFFIXES = (".yaml", ".yml")
 CHECKPOINT_SUFFIX = ".ckpt"
+
+# The method of several scans that learns nothing.
+PERSISTENCE = "persistence"
 
 # The network whose models see the scans around each unasked; and how many before and after, as far
 # as they are of its recording.
@@ -95,8 +98,8 @@ def refuse_same_titles(titles: Sequence[str]) -> None:
 
 
 def method_names() -> list[str]:
-    """Names that methods are called by: the model that comes with derain, filters, and others."""
-    return [DEFAULT, *FILTERS, *METHODS]
+    """Names of methods: the model that comes with derain, filters, and persistence."""
+    return [DEFAULT, *FILTERS, PERSISTENCE]
 
 
 def method_hint(name: str) -> str:
@@ -112,7 +115,7 @@ def method_hint(name: str) -> str:
 
 def is_method_name(word: str) -> bool:
     """True if a method has this name; other packages load only if none of derain's has it."""
-    return word == DEFAULT or word in FILTERS or word in METHODS
+    return word in (DEFAULT, PERSISTENCE) or word in FILTERS
 
 
 def load_method(
@@ -121,9 +124,8 @@ def load_method(
     """Makes a method ready to judge scans; its warnings are left to the caller.
 
     Args:
-        name: ``default``, the model that comes with derain; a filter (one of ``FILTERS``), a method
-            that sees several scans (one of ``METHODS``), or an ONNX file written by ``derain
-            export``.
+        name: ``default``, the model that comes with derain; a filter (one of ``FILTERS``),
+            ``persistence``, or an ONNX file written by ``derain export``.
         parameters: Parameters by name: those of the filter and its ``candidates``, those of the
             method, or the ``threshold`` of the model.
         threads: Threads to use; 0 takes every core this process may use.
@@ -139,15 +141,16 @@ def load_method(
 
 
 def _loaded(name: str, parameters: Mapping[str, Any], threads: int, runtime: Runtime) -> Method:
+    if name == PERSISTENCE:
+        from derain.recordings.persistence import Persistence, PersistenceDerainer  # odometry
+
+        _refuse_runtime(name, "method", runtime)
+        return PersistenceDerainer(from_parameters(Persistence, name, parameters), threads)
     # What has a suffix is a file, for which other packages need not be loaded.
-    if name != DEFAULT and not Path(name).suffix:
-        if name in FILTERS:
-            _refuse_runtime(name, "filter", runtime)
-            of_filter = {key: value for key, value in parameters.items() if key != CANDIDATES}
-            return FilterDerainer(filter_from(name, of_filter), threads, parameters.get(CANDIDATES))
-        if name in METHODS:
-            _refuse_runtime(name, "method", runtime)
-            return METHODS[name].with_parameters(parameters, threads)
+    if name != DEFAULT and not Path(name).suffix and name in FILTERS:
+        _refuse_runtime(name, "filter", runtime)
+        of_filter = {key: value for key, value in parameters.items() if key != CANDIDATES}
+        return FilterDerainer(filter_from(name, of_filter), threads, parameters.get(CANDIDATES))
     if name != DEFAULT and not is_file(Path(name)):
         raise InputError(name, "no such method or file", f"{method_hint(name)}.")
     if Path(name).suffix == CHECKPOINT_SUFFIX:

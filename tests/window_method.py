@@ -1,18 +1,17 @@
 """A method that sees the scans before and after one, for tests of what takes any method."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
-from typing import Any, ClassVar, Self
+from typing import Any
 
 import numpy as np
 
 from derain.errors import InputError
-from derain.recordings.recording_method import RecordingMethod
 from derain.scan import Array, Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
+from derain.sources.method import Method
 from derain.sources.recent_frames import FrameInWindow, RecentFrames
-from derain.system.registry import from_parameters
 from derain.system.stopwatch import Stopwatch
 from derain.views.scan_issues import ScanIssue
 from derain.views.window import PlacedScan, Window
@@ -26,24 +25,18 @@ class Dimmer:
     sure_within: float = 30.0
 
 
-class Between(RecordingMethod):
+class Between(Method):
     """Calls dim points rain; it is sure of near ones, where scans are before and after.
 
     Attributes:
         poses: Poses of the scans that it has judged, with those around them.
     """
 
-    HELP: ClassVar[str] = "rain is what is dim between two scans"
-
     def __init__(self, dimmer: Dimmer = Dimmer(), threads: int = 0) -> None:
         self.dimmer = dimmer
         self.threads = threads
         self.poses: list[Any] = []
         self._recent = RecentFrames(self.window)
-
-    @classmethod
-    def with_parameters(cls, parameters: Mapping[str, Any], threads: int) -> Self:
-        return cls(from_parameters(Dimmer, "between", parameters), threads)
 
     @property
     def window(self) -> Window:

@@ -17,7 +17,6 @@ from derain.files.format import FORMATS
 from derain.files.names import scan_suffix
 from derain.files.reading import is_file
 from derain.filters import FILTERS
-from derain.recordings.recording_method import METHODS
 from derain.sources.method import Method
 from derain.stores.url import Place, is_url, place_of
 
@@ -42,8 +41,10 @@ def _listed_methods(of_recordings: bool) -> str:
         ("the model that comes with derain", model),
         ("filters", {name: filter_.HELP for name, filter_ in FILTERS.items()}),
     ]
-    if of_recordings and METHODS:
-        several = {name: method.HELP for name, method in METHODS.items()}
+    if of_recordings:
+        from derain.recordings.persistence import PersistenceDerainer  # which imports odometry
+
+        several = {methods.PERSISTENCE: PersistenceDerainer.HELP}
         parts.append(("methods that see several scans of a recording", several))
     lines = []
     for heading, helps in parts:

@@ -1,6 +1,6 @@
 """Rain by free space: what rays of the scans before and after went through was not there."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any, Self
 from weakref import WeakKeyDictionary
@@ -11,13 +11,11 @@ from derain.files.documents import Entry
 from derain.recordings.evidence import ScanPoints, combined_log_odds, vote
 from derain.recordings.placing import PlacedFrames, PlacedMethod
 from derain.recordings.rays import RayEvidence, mean_evidence
-from derain.recordings.recording_method import METHODS, RecordingMethod
 from derain.scan import Bools, Floats, Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.recent_frames import FrameInWindow
 from derain.system.cores import threads_of
-from derain.system.registry import from_parameters
 from derain.system.stopwatch import Stopwatch
 from derain.views.one_viewpoint import viewpoint_issues
 from derain.views.scan_issues import ScanIssue, intensity_in_places
@@ -49,8 +47,7 @@ class Persistence:
             raise sure.fault(f"{self.sure:g} is not 1 or more", "Give the odds of a sure answer.")
 
 
-@METHODS.add("persistence")
-class PersistenceDerainer(PlacedMethod, RecordingMethod):
+class PersistenceDerainer(PlacedMethod):
     """Calls rain what is not where it was, by rays of other scans and its surroundings.
 
     Solid things are where they were a tenth of a second ago; a drop is not, and the rays that pass
@@ -78,21 +75,13 @@ class PersistenceDerainer(PlacedMethod, RecordingMethod):
         Grids for Mobile Robot Perception and Navigation", 1989), with rays instead of cells.
     """
 
+    # The method's definition of rain, in one line for the help of commands.
     HELP = "rain does not stay in its place: rays of other scans pass through it"
 
     def __init__(self, persistence: Persistence = Persistence(), threads: int = 0) -> None:
         self.persistence = persistence
         self.threads = threads_of(threads)
         self._end_recording()
-
-    @classmethod
-    def with_parameters(cls, parameters: Mapping[str, Any], threads: int) -> Self:
-        """Makes the method of the fields of :class:`Persistence`.
-
-        Raises:
-            InputError: A parameter that it does not have, or a value that it cannot have.
-        """
-        return cls(from_parameters(Persistence, "persistence", parameters), threads)
 
     @property
     def window(self) -> Window:
@@ -112,7 +101,7 @@ class PersistenceDerainer(PlacedMethod, RecordingMethod):
 
     def as_dict(self) -> dict[str, Any]:
         """Its name and parameters."""
-        return {"method": METHODS.name_of(type(self)), **asdict(self.persistence)}
+        return {"method": "persistence", **asdict(self.persistence)}
 
     def __reduce__(self) -> tuple[type[Self], tuple[Persistence, int], dict[str, Any]]:
         # A copy, as in another process, begins a recording of its own.

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,22 +10,39 @@ import numpy as np
 import pytest
 from contents import contents
 from recorded_scenes import write_scenes
-from window_method import Between
+from window_method import Between, Dimmer
 
 from derain.annotation.manifest import CARD, LABELS, TAUGHT_MANIFEST, Manifest
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
+from derain.export import methods
 from derain.files.labels import read_labels, write_labels
 from derain.jobs.job import FOLDER
-from derain.recordings.recording_method import METHODS
+from derain.sources.method import Method
+from derain.system.registry import from_parameters
 
 POINTS = 200
 
 
 @pytest.fixture(autouse=True)
 def between(monkeypatch) -> None:
-    """Enters a method of windows."""
-    monkeypatch.setattr(METHODS, "_members", {**METHODS, "between": Between})
+    """Enters a method of windows, in place of persistence."""
+
+    def made(name: str, parameters: dict[str, Any], *_: object) -> Between:
+        return Between(from_parameters(Dimmer, name, parameters))
+
+    enter(monkeypatch, made)
+
+
+def enter(monkeypatch: pytest.MonkeyPatch, make: Callable[..., Between]) -> None:
+    """Has commands make a method by the name ``between``."""
+    loaded, is_name = methods.load_method, methods.is_method_name
+
+    def load(name: str, *options: Any) -> Method:
+        return make(name, *options) if name == "between" else loaded(name, *options)
+
+    monkeypatch.setattr(methods, "load_method", load)
+    monkeypatch.setattr(methods, "is_method_name", lambda word: word == "between" or is_name(word))
 
 
 @pytest.fixture
@@ -125,12 +143,11 @@ def test_the_sensor_is_where_the_option_places_it(
 ) -> None:
     made: list[Between] = []
 
-    class Noted(Between):
-        def __init__(self, *arguments: object) -> None:
-            super().__init__()
-            made.append(self)
+    def noted(*_: object) -> Between:
+        made.append(Between())
+        return made[-1]
 
-    monkeypatch.setattr(METHODS, "_members", {"between": Noted})
+    enter(monkeypatch, noted)
     poses = tmp_path / "poses.txt"
     poses.write_text("".join(f"1 0 0 {n} 0 1 0 0 0 0 1 0\n" for n in range(6)))
     for options in ([], ["--poses", poses], ["--poses", "standing"]):

@@ -7,8 +7,15 @@ import pytest
 import yaml
 
 from derain.errors import InputError
-from derain.export.methods import load_method, named_method, read_parameters
+from derain.export.methods import (
+    load_method,
+    load_method_of_one_scan,
+    named_method,
+    read_parameters,
+)
+from derain.export.runtimes.session import Runtime
 from derain.filters.derainer import CANDIDATES
+from derain.recordings.persistence import Persistence, PersistenceDerainer
 from derain.views.candidates import Bound, Candidates
 
 KEPT = Path(__file__).parent / "kept"
@@ -69,3 +76,18 @@ def test_a_file_that_holds_no_parameters_is_refused(tmp_path, content) -> None:
     with pytest.raises(InputError, match=r"best\.yaml: ") as refusal:
         read_parameters(path)
     assert len(str(refusal.value)) < len(str(path)) + 300
+
+
+def test_persistence_is_made_of_its_parameters_and_sees_several_scans() -> None:
+    method = load_method("persistence", {"before": 2, "sure": 5.0}, threads=3)
+    assert isinstance(method, PersistenceDerainer)
+    assert (method.persistence, method.threads) == (Persistence(before=2, sure=5.0), 3)
+    assert method.as_dict() == {"method": "persistence", "before": 2, "after": 1, "sure": 5.0}
+    with pytest.raises(InputError, match=r"persistence: it has no parameter reach, way\. It has"):
+        load_method("persistence", {"way": 1, "reach": 2, "before": 1})
+    with pytest.raises(InputError, match="a method, which has no network that openvino"):
+        load_method("persistence", {}, runtime=Runtime("openvino"))
+    with pytest.raises(InputError, match="persistence: sees the scans around the one that it"):
+        load_method_of_one_scan("persistence", {})
+    with pytest.raises(InputError, match=r"one of .*dror.*, persistence"):
+        load_method("nobody", {})
