@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from derain.datamodules.user_changes import changed_as_by_users, in_sector
+from derain.datamodules.user_changes import changed_as_by_users
 from derain.files.documents import Entry
 from derain.scan import Bools, Float32s, Scan
 from derain.views.spherical_grid import ALL_AROUND, FULL_CIRCLE
@@ -16,9 +16,6 @@ from derain.views.spherical_grid import ALL_AROUND, FULL_CIRCLE
 # Source: modelling choices, as are the rest.
 OF_RAIN, STRONGEST, WHOLE = 0.45, 4.0, 0.4
 COARSEST = (-2.5, 0.5)
-
-# The most of what is no share.
-MOST = {"jitter": math.inf, "sector": FULL_CIRCLE}
 
 # Levels that intensities are cut to, where they are.
 FEW_LEVELS = 7
@@ -43,9 +40,6 @@ class Augmentation:
         mirror_probability: Share of scans whose left and right are swapped.
         dropping_probability: Share of scans that lose points.
         dropping: The largest share of its points that such a scan loses.
-        sector_probability: Share of scans of which only a sector is kept, so that a batch of as
-            many points holds more scans.
-        sector: Width of the sector, degrees.
         brightness_probability: Share of scans that are given other intensities, see
             :func:`~derain.datamodules.augmentation.with_other_brightness`.
         user_probability: Share of scans that are changed as users change theirs, see
@@ -64,19 +58,17 @@ class Augmentation:
     mirror_probability: float = 0.0
     dropping_probability: float = 0.0
     dropping: float = 0.5
-    sector_probability: float = 0.0
-    sector: float = 90.0
     brightness_probability: float = 0.0
     user_probability: float = 0.0
 
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():
-            Entry("augmentation", name, value).within(0, MOST.get(name, 1))
+            Entry("augmentation", name, value).within(0, math.inf if name == "jitter" else 1)
 
     @property
     def changes_anything(self) -> bool:
         """True if any scan is changed."""
-        of_points = self.jitter_probability, self.dropping_probability, self.sector_probability
+        of_points = self.jitter_probability, self.dropping_probability
         of_scans = self.rotation_probability, self.mirror_probability
         other = self.brightness_probability, self.user_probability
         return max(*of_points, *of_scans, *other) > 0
@@ -120,8 +112,6 @@ class Augmentation:
             changed = changed.take(generator.random(len(scan)) >= share)
         if not changed.valid.any():
             return changed
-        if self.sector_probability and generator.random() < self.sector_probability:
-            changed = changed.take(in_sector(changed, self.sector, generator))
         if self.user_probability and generator.random() < self.user_probability:
             changed = changed_as_by_users(changed.take(changed.valid), generator)
         return changed

@@ -37,8 +37,6 @@ from derain.models.lisnownet import LiSnowNet as LiSnowNet
 from derain.models.lisnownet import LiSnowNetwork as LiSnowNetwork
 from derain.models.outdet import OutDet as OutDet
 from derain.models.outdet import OutDetNetwork as OutDetNetwork
-from derain.models.relative_outdet import RelativeOutDet as RelativeOutDet
-from derain.models.relative_outdet import RelativeOutDetNetwork as RelativeOutDetNetwork
 from derain.models.salsanext import SalsaNext as SalsaNext
 from derain.models.salsanext import SalsaNextNetwork as SalsaNextNetwork
 from derain.models.salsanext_lite import SalsaNextLite as SalsaNextLite

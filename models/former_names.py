@@ -5,6 +5,11 @@ from typing import Any
 # The names that options have now, by their former names.
 FORMER_OPTIONS = {"way_back": "back_projection", "kept_megabytes": "cache_mb"}
 
+# Networks that derain has no longer, and what to do about a checkpoint of one.
+FORMER_NETWORKS = {
+    "relative_outdet": "Train `cues`, which replaced it; ONNX files of it still run.",
+}
+
 FORMER_MONITOR, MONITOR = "val/merit", "val/score"
 
 

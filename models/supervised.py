@@ -1,16 +1,13 @@
 """The base class of derainers that learn from labels: their loss."""
 
-import math
 import sys
 from collections.abc import Sequence
 
 import torch
-from lightning.pytorch.utilities.types import OptimizerLRScheduler
 from torch import Tensor
 
 from derain.cards.card import DataCard
 from derain.cards.rain_found import require_rain
-from derain.errors import InputError
 from derain.learning.batch import Batch
 from derain.learning.losses import SegmentationLoss, class_weights, segmentation_loss
 from derain.learning.task import Task, TrainingData
@@ -19,15 +16,6 @@ from derain.scan import Scan
 from derain.views.candidate_fit import fit_candidates
 from derain.views.candidates import Candidates
 from derain.views.view import IGNORED
-
-# Share of the training in which the learning rate rises; then it falls.
-WARM_UP_SHARE = 0.1
-
-# The learning rate rises in this many steps at least: torch would divide a single one by 0.
-SHORTEST_WARM_UP = 1.5
-
-# The first learning rate is the highest divided by this, and the last at least this share of it.
-FIRST_DIVISOR, LEAST_SHARE = 25.0, 4e-6
 
 
 class SupervisedModule(DerainingModule):
@@ -107,41 +95,3 @@ class SupervisedModule(DerainingModule):
         if judged.all():  # as of points, which are not to be copied for nothing
             return segmentation_loss(logits, target, self.class_weight)
         return segmentation_loss(logits[judged], target[judged], self.class_weight)
-
-
-def one_cycle(model: SupervisedModule, final_share: float = 0.0) -> OptimizerLRScheduler:
-    """AdamW with a learning rate that rises and falls once in the whole training.
-
-    It goes by the model's highest ``learning_rate`` and its ``weight_decay``.
-
-    Args:
-        model: The model.
-        final_share: Share of the highest learning rate at the end.
-
-    Source: L. N. Smith and N. Topin, "Super-Convergence: Very Fast Training of Neural Networks
-        Using Large Learning Rates", 2018.
-
-    Raises:
-        InputError: A training without a last step.
-    """
-    steps = model.trainer.estimated_stepping_batches
-    if steps == math.inf:
-        raise InputError(
-            "--trainer.max_epochs",
-            "without it, the learning rate cannot be planned to the last step",
-            "Give it, or --trainer.max_steps.",
-        )
-    rate = model.hparams["learning_rate"]
-    optimizer = torch.optim.AdamW(
-        model.parameters(), lr=rate, weight_decay=model.hparams["weight_decay"]
-    )
-    steps = max(int(steps), 2)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimizer,
-        rate,
-        total_steps=steps,
-        pct_start=max(WARM_UP_SHARE, SHORTEST_WARM_UP / steps),
-        div_factor=FIRST_DIVISOR,
-        final_div_factor=1 / (FIRST_DIVISOR * max(final_share, LEAST_SHARE)),
-    )
-    return {"optimizer": optimizer, "lr_scheduler": {"scheduler": schedule, "interval": "step"}}

@@ -29,7 +29,7 @@ to train a model that works anywhere. A YAML file of your own sets what is drawn
 derain/simulation/worlds/world.yaml.
 
   derain simulate --out worlds --world --sequences 500
-  derain fit --config relative_outdet_worlds.yaml --data.root worlds --data.make false
+  derain fit --config cues_worlds.yaml --data Worlds --data.root worlds --data.make false
 
 Many machines can make one data set in a folder that they share: with --dask, or one shard each. The
 last one to end completes manifest.json. The bytes stay the same.

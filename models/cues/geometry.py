@@ -4,20 +4,32 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from derain.models.beam_steps import (
-    FARTHEST_IN_STEPS,
-    NEAREST_POINT,
-    NEAREST_TO_AXIS,
-    NEIGHBOUR_NUMBERS,
-    SHELL_REACH,
-    SHELLS,
-    STEP_EPSILON,
-    USUAL_RANGE,
-    active,
-    asinh,
-    farther_by,
-)
 from derain.views.isolated_points import SHELL_MIDDLES
+
+# Nothing is measured nearer than this, metres, nor right above the sensor; both keep every
+# division finite.
+NEAREST_POINT = 0.05
+NEAREST_TO_AXIS = 0.01
+
+# Added to what logarithms are taken of, which may be 0.
+STEP_EPSILON = 1e-2
+
+# Ranges are logarithms over this one, metres.
+USUAL_RANGE = 10.0
+
+# However far a neighbour is, no number that describes it is greater.
+FARTHEST_IN_STEPS = 10.0
+
+# How many numbers describe where a neighbour is.
+NEIGHBOUR_NUMBERS = 4
+
+# Slope of every activation below 0.
+NEGATIVE_SLOPE = 0.1
+
+# Centres of shells around the sensor in which what a scan holds is averaged: logarithms of their
+# ranges over 10 m, which are 1.7 to 90 m, and how far each shell reaches into the next.
+CENTRES = (-1.8, 2.2, 9)
+SHELL_REACH = 0.35
 
 # Added to what is divided by, which may be 0.
 EPSILON = 1e-3
@@ -74,7 +86,7 @@ class Geometry(nn.Module):
         self.from_opinions = nn.Linear(neighbours * opinion, width, bias=False)
         self.opinions = AcrossFeatures(width, width)
         self.head = AcrossFeatures(width, 1)
-        self.register_buffer("centres", torch.linspace(*SHELLS)[:, None], persistent=False)
+        self.register_buffer("centres", torch.linspace(*CENTRES)[:, None], persistent=False)
         middles = torch.from_numpy(SHELL_MIDDLES / USUAL_RANGE).log().float()
         self.register_buffer("middles", middles, persistent=False)
 
@@ -188,3 +200,32 @@ def taken(values: Tensor, numbers: Tensor) -> Tensor:
 def taken_of_each(rows: Tensor, numbers: Tensor) -> Tensor:
     """Some of the values of each row by their numbers (D,), as :func:`taken`: (R, D) of (R, S)."""
     return rows.gather(1, numbers.expand(rows.shape[0], -1))
+
+
+def active(features: Tensor) -> Tensor:
+    """Features after their activation."""
+    return functional.leaky_relu(features, NEGATIVE_SLOPE)
+
+
+def asinh(steps: Tensor) -> Tensor:
+    """The inverse hyperbolic sine, by a logarithm: onnxruntime's own is many times slower."""
+    size = steps.abs()
+    return torch.sign(steps) * torch.log(size + (size * size + 1).sqrt())
+
+
+def farther_by(distance: Tensor, dot: Tensor, apart: Tensor) -> Tensor:
+    """Difference of ranges between neighbours: a difference of squares by the sum.
+
+    The difference of two ranges would leave the rounding of both, which where beams lie close is no
+    small part of a step.
+
+    Args:
+        distance: Ranges of the points, metres, float; of a shape that goes with the others'.
+        dot: Products of the points with the offsets of their neighbours, float.
+        apart: Their distances from the points, metres, float.
+
+    Returns:
+        Metres, float, in the shape of ``dot``.
+    """
+    squares = 2 * dot + apart * apart
+    return squares / ((distance * distance + squares).clamp_min(0).sqrt() + distance)

@@ -1,5 +1,6 @@
 """Cues: evidence of rain from geometry and from brightness, weighed by one fusion."""
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Any, ClassVar
 
@@ -10,16 +11,24 @@ from torch.nn import functional
 
 from derain.errors import InputError
 from derain.learning.batch import Batch
-from derain.models.beam_steps import both_logits
-from derain.models.cues.network import APART, CueNetwork
+from derain.models.cues.network import APART, CueNetwork, both_logits
 from derain.models.registry import NETWORKS
-from derain.models.supervised import SupervisedModule, one_cycle
+from derain.models.supervised import SupervisedModule
 from derain.scan import Scan
 from derain.views.isolated_points import CHANNELS, IsolatedPointView
 from derain.views.view import IGNORED, View
 
 # How much the answers of geometry and of each round count in the loss.
 WEIGHTS = (0.3, 0.3, 1.0)
+
+# Share of the training in which the learning rate rises; then it falls.
+WARM_UP_SHARE = 0.1
+
+# The learning rate rises in this many steps at least: torch would divide a single one by 0.
+SHORTEST_WARM_UP = 1.5
+
+# The first learning rate is the highest divided by this, and the last at least this share of it.
+FIRST_DIVISOR, LEAST_SHARE = 25.0, 4e-6
 
 
 @NETWORKS.add("cues")
@@ -127,8 +136,38 @@ class CueFusion(SupervisedModule):
         return self.network
 
     def configure_optimizers(self) -> OptimizerLRScheduler:
-        """AdamW with a learning rate that rises and falls once in the whole training."""
-        return one_cycle(self, self.hparams["final_share"])
+        """AdamW with a learning rate that rises and falls once in the whole training.
+
+        Source: L. N. Smith and N. Topin, "Super-Convergence: Very Fast Training of Neural Networks
+            Using Large Learning Rates", 2018.
+
+        Raises:
+            InputError: A training without a last step.
+        """
+        steps = self.trainer.estimated_stepping_batches
+        if steps == math.inf:
+            raise InputError(
+                "--trainer.max_epochs",
+                "without it, the learning rate cannot be planned to the last step",
+                "Give it, or --trainer.max_steps.",
+            )
+        rate = self.hparams["learning_rate"]
+        optimizer = torch.optim.AdamW(
+            self.parameters(), lr=rate, weight_decay=self.hparams["weight_decay"]
+        )
+        steps = max(int(steps), 2)
+        schedule = torch.optim.lr_scheduler.OneCycleLR(
+            optimizer,
+            rate,
+            total_steps=steps,
+            pct_start=max(WARM_UP_SHARE, SHORTEST_WARM_UP / steps),
+            div_factor=FIRST_DIVISOR,
+            final_div_factor=1 / (FIRST_DIVISOR * max(self.hparams["final_share"], LEAST_SHARE)),
+        )
+        return {
+            "optimizer": optimizer,
+            "lr_scheduler": {"scheduler": schedule, "interval": "step"},
+        }
 
     def _answers(self, batch: Batch) -> list[Tensor]:
         """All answers of :meth:`CueNetwork.answers`, float (S,) each, of all scans."""

@@ -7,9 +7,16 @@ from functools import cached_property
 import torch
 from torch import Tensor, nn
 
-from derain.models.beam_steps import NEAREST_POINT, USUAL_RANGE, both_logits
-from derain.models.carrier import without_carrier
-from derain.models.cues.geometry import AcrossFeatures, Geometry, in_steps, taken, taken_of_each
+from derain.models.cues.carrier import without_carrier
+from derain.models.cues.geometry import (
+    NEAREST_POINT,
+    USUAL_RANGE,
+    AcrossFeatures,
+    Geometry,
+    in_steps,
+    taken,
+    taken_of_each,
+)
 from derain.views.intensity_rank import INTENSITY_RANKS
 from derain.views.isolated_points import SHELLS
 
@@ -147,6 +154,11 @@ class CueNetwork(nn.Module):
         if_unknown = self.without_intensity * (counts[:, 1:].sum() == 0).to(rain.dtype)
         answers = [answer + if_unknown * _raininess(answer, size) for answer in answers]
         return [*answers, without_carrier(answers[-1], far, size)]
+
+
+def both_logits(rain: Tensor) -> Tensor:
+    """Logits of "not rain", which are 0, and of "rain", float (M, 2), of the latter, float (M,)."""
+    return torch.stack([torch.zeros_like(rain), rain], dim=1)
 
 
 def _raininess(rain: Tensor, size: Tensor) -> Tensor:

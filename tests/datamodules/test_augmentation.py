@@ -15,7 +15,6 @@ from derain.scan import Scan
 HARD_CASES = dict(hard_cases(largest=5000))
 TURN = Augmentation(rotation_probability=1, jitter_probability=0)
 MIRROR = Augmentation(0, 0, mirror_probability=1)
-SECTOR = Augmentation(0, 0, sector_probability=1, sector=70)
 DROP = Augmentation(0, 0, dropping_probability=1)
 BOTH = Augmentation(rotation_probability=1, jitter_probability=1)
 CERTAINTY = st.sampled_from([0, 1])
@@ -101,8 +100,8 @@ def test_points_that_cannot_be_judged_stay_as_they_are(scan) -> None:
     before = scan.xyz.copy()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        changed, mirrored, dropped, _ = (
-            each(scan, np.random.default_rng(0)) for each in (BOTH, MIRROR, DROP, SECTOR)
+        changed, mirrored, dropped = (
+            each(scan, np.random.default_rng(0)) for each in (BOTH, MIRROR, DROP)
         )
     assert changed.xyz.dtype == np.float32
     np.testing.assert_array_equal(scan.xyz, before)
@@ -112,21 +111,6 @@ def test_points_that_cannot_be_judged_stay_as_they_are(scan) -> None:
     np.testing.assert_array_equal(changed.xyz[~scan.valid], scan.xyz[~scan.valid])
     np.testing.assert_array_equal(changed.intensity, scan.intensity)
     assert (changed.xyz[scan.valid] != scan.xyz[scan.valid]).any() or not scan.valid.any()
-
-
-@given(st.integers(0, 2**32))
-def test_a_sector_is_all_that_there_is_between_two_azimuths(seed) -> None:
-    scan = Scan.of(scene(500)).with_label(np.arange(500))
-    kept = SECTOR(scan, np.random.default_rng(seed))
-    rows = kept.label
-    np.testing.assert_array_equal(kept.xyz, scan.xyz[rows])
-    left = np.setdiff1d(np.arange(len(scan)), rows)
-    azimuth = np.degrees(np.arctan2(scan.xyz[:, 1], scan.xyz[:, 0]))
-    # Some direction is the middle of what is kept, and has nothing of the rest within 35 degrees.
-    middles = np.arange(-180, 180, 0.5)
-    off = np.abs((azimuth[:, None] - middles + 180) % 360 - 180)
-    inside, outside = off[rows].max(axis=0) <= 35.3, off[left].min(axis=0, initial=180) >= 34.7
-    assert (inside & outside).any()
 
 
 def test_other_intensities_are_alike_inverted_or_of_few_levels_and_all_else_stays() -> None:
@@ -164,7 +148,7 @@ def test_rain_alone_may_get_other_intensities() -> None:
 
 @pytest.mark.parametrize(
     ("option", "value"),
-    [("dropping", 2), ("mirror_probability", 1.5), ("jitter", -0.1), ("sector", 400)],
+    [("dropping", 2), ("mirror_probability", 1.5), ("jitter", -0.1)],
 )
 def test_numbers_that_no_scan_can_be_changed_by_are_refused(option, value) -> None:
     with pytest.raises(InputError, match=option):

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from derain.datamodules.user_changes import (
     ALL_CHANGES,
@@ -10,6 +12,7 @@ from derain.datamodules.user_changes import (
     across,
     along,
     changed_as_by_users,
+    in_sector,
 )
 from derain.evaluation.hard_cases import scene
 from derain.scan import Float32s, Floats, Scan
@@ -69,3 +72,15 @@ def test_every_change_is_drawn_and_no_two_scans_are_changed_alike() -> None:
     sizes = {len(changed_as_by_users(scan, np.random.default_rng(seed))) for seed in range(60)}
     assert min(sizes) < len(scan) < max(sizes)
     assert len(sizes) > 10
+
+
+@given(st.integers(0, 2**32))
+def test_a_sector_is_all_that_there_is_between_two_azimuths(seed) -> None:
+    scan = Scan.of(scene(500))
+    kept = in_sector(scan, 70, np.random.default_rng(seed))
+    azimuth = np.degrees(np.arctan2(scan.xyz[:, 1], scan.xyz[:, 0]))
+    # Some direction is the middle of what is kept, and has nothing of the rest within 35 degrees.
+    middles = np.arange(-180, 180, 0.5)
+    off = np.abs((azimuth[:, None] - middles + 180) % 360 - 180)
+    inside, outside = off[kept].max(axis=0) <= 35.3, off[~kept].min(axis=0, initial=180) >= 34.7
+    assert (inside & outside).any()

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from torch import Tensor
 
 from derain.cards.card import load_card
 from derain.errors import InputError
@@ -13,6 +14,7 @@ from derain.evaluation.counts import Counts
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export.candidates import fit_network_candidates
 from derain.export.runtime import Derainer
+from derain.models.outdet import OutDet
 from derain.scan import Scan
 from derain.views.candidates import Bound, Candidates
 
@@ -103,3 +105,14 @@ def test_a_model_that_was_trained_with_candidates_stays_within_them(
     bounds = {bound.channel: bound for bound in fitted.candidates.bounds}
     assert bounds["range"].most <= 8.0
     assert "intensity" in bounds
+
+
+def test_a_network_whose_answers_depend_on_all_points_is_given_none(
+    random_outdet, labelled, monkeypatch
+) -> None:
+    def forward(model: OutDet, points: Tensor, distances: Tensor, neighbours: Tensor) -> Tensor:
+        raise AssertionError("it is refused before it judges a scan")
+
+    monkeypatch.setattr(OutDet, "forward", forward)
+    with pytest.raises(InputError, match="--candidates: outdet judges every point alike"):
+        fit_network_candidates(random_outdet, labelled, WADS)

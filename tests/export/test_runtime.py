@@ -3,7 +3,9 @@
 ``kept/`` holds a 3D-OutDet of three neighbours, of random weights drawn with seed 0. The checkpoint
 was written by `save_model`, the model by ``derain export outdet.ckpt --out outdet.onnx`` of
 derain 0.1.0, before a Spec could lack a field and before a file had a checksum. ``probability.npy``
-is what that model answered for ``scene(300)``. None of the three is ever to be written again.
+is what that model answered for ``scene(300)``. ``version1.onnx`` has the network of version 1 of
+the default model, small, trained on a few scenes and exported by derain 0.2.0; ``version1.npy`` is
+what it answered. None of the five is ever to be written again.
 """
 
 import pickle
@@ -61,6 +63,14 @@ def test_files_of_an_early_derain_answer_as_they_did() -> None:
     assert model.spec == early.spec
     assert (early.spec.data, early.spec.rain) == ("WADS", (110,))
     assert len(early.metadata["proof"]["cases"]) == 48
+
+
+def test_files_of_version_1_of_the_default_model_answer_as_they_did() -> None:
+    kept = np.load(KEPT / "version1.npy")
+    assert 0.02 < (kept > 0.5).mean() < 0.1
+    early = Derainer(KEPT / "version1.onnx", threads=1)
+    np.testing.assert_allclose(early.probability(scene(300)), kept, rtol=0, atol=1e-6)
+    assert (early.spec.network, early.spec.channels) == ("relative_outdet", ("x", "y", "z"))
 
 
 @pytest.mark.parametrize(

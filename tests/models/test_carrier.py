@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from torch import Tensor
 
-from derain.models.beam_steps import USUAL_RANGE
-from derain.models.carrier import OF_CARRIER, without_carrier
+from derain.models.cues.carrier import OF_CARRIER, without_carrier
+from derain.models.cues.geometry import USUAL_RANGE
 
 # Logits of what is surely a drop, and of what is surely none.
 DROP, NO_DROP = 8.0, -8.0

@@ -9,7 +9,7 @@ from derain.models.registry import NETWORKS
 
 
 def test_derain_has_these_networks_and_each_knows_its_name() -> None:
-    names = ("cues", "lisnownet", "outdet", "relative_outdet", "salsanext", "salsanext_lite")
+    names = ("cues", "lisnownet", "outdet", "salsanext", "salsanext_lite")
     assert {name: network.NAME for name, network in NETWORKS.items()} == {n: n for n in names}
     published = {name for name, network in NETWORKS.items() if issubclass(network, Published)}
     assert published == {"lisnownet", "outdet", "salsanext"}

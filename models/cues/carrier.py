@@ -5,7 +5,7 @@ import math
 import torch
 from torch import Tensor
 
-from derain.models.beam_steps import USUAL_RANGE
+from derain.models.cues.geometry import USUAL_RANGE
 
 # The vehicle or mast that carries a sensor is seen within OF_CARRIER metres, often in a few
 # scattered points that look like drops. Real drops do not end there: from there to BEYOND_CARRIER
