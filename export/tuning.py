@@ -1,6 +1,7 @@
 """Finds the parameters of a method that give the greatest IoU on labelled scans."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -121,8 +122,9 @@ def tune_filter(
 
     The first trial is that of the filter's default parameters. A search may be broken off, even in
     the midst of a trial, and started again: it then comes to the result that it would have come to.
-    Several searches of one storage share the trials, and come to the same result; with the values
-    that others compute meanwhile they draw other trials than one search alone.
+    Several searches of one storage share the trials; with the values that others compute meanwhile
+    they draw other trials than one search alone. Each ends once there are enough; the others may
+    then be at work on one more each, and find better parameters.
 
     Args:
         name: One of ``FILTERS``.
@@ -143,30 +145,34 @@ def tune_filter(
         scans and 100 trials as in the REHEARSE-3D paper.
     """
     import optuna
+    from optuna.trial import TrialState
     from sqlalchemy.exc import SQLAlchemyError
 
-    from derain.export.shared_trials import SharedTrials
-
     optuna.logging.set_verbosity(optuna.logging.WARNING)
-    space, default = search_space(name), filter_from(name, {})
-    first = {parameter: getattr(default, parameter) for parameter in space}
-    kept = None if storage is None else storage.open()
-    trials_kept = optuna.storages.get_storage(kept)  # in memory where none is to be kept
+    default = filter_from(name, {})
+    kept = None if storage is None else storage.open()  # in memory where none is to be kept
     labelled = list(scans.values())
     try:
-        shared = SharedTrials(trials_kept, name, distributions_of(name), first, seed)
-        _agree_on_data(shared.study, name, scans, storage)
-        while trial := shared.next(trials):
-            shared.finish(trial, pooled_iou(filter_from(name, trial.params), labelled))
+        study = optuna.create_study(
+            storage=kept, study_name=name, direction="maximize", load_if_exists=True
+        )
+        _agree_on_data(study, name, scans, storage)
+        _begin(study, default)
+        while len(_trials(study, TrialState.COMPLETE)) < trials:
+            trial = _drawn(study, name, seed)
+            iou = pooled_iou(filter_from(name, trial.params), labelled)
+            with suppress(RuntimeError):  # see _begin
+                study.tell(trial, iou, skip_if_finished=True)
             after_trial()
-        parameters, iou = shared.best()
+        best = max(_trials(study, TrialState.COMPLETE), key=lambda trial: trial.values[0])
     except BrokenPipeError:  # the pipe that after_trial prints to, not the storage
         raise
     except (optuna.exceptions.OptunaError, SQLAlchemyError, OSError) as error:
         if storage is None:
             raise
         raise storage.refused(error) from error
-    return Tuned(filter_from(name, parameters).as_dict(), iou, pooled_iou(default, labelled))
+    parameters = filter_from(name, best.params).as_dict()
+    return Tuned(parameters, best.values[0], pooled_iou(default, labelled))
 
 
 def tune_threshold(judged: Iterable[tuple[Float32s, Bools]], threshold: float) -> Tuned:
@@ -240,20 +246,44 @@ def _agree_on_data(
         study.set_user_attr(key, fact)
 
 
-def distributions_of(name: str) -> "dict[str, optuna.distributions.BaseDistribution]":
-    """The distributions that the parameters of a filter are drawn from, by name.
+def _trials(
+    study: "optuna.Study", *states: "optuna.trial.TrialState"
+) -> "list[optuna.trial.FrozenTrial]":
+    return study.get_trials(deepcopy=False, states=states)
 
-    Args:
-        name: One of ``FILTERS``.
 
-    Raises:
-        InputError: A filter that cannot be tuned.
+def _begin(study: "optuna.Study", default: PointFilter) -> None:
+    """Gives up the trials that were left, and has the filter's own parameters tried first.
+
+    A search that was killed left a trial running. One that is at work looks the same: it computes
+    its trial in vain, once, and goes on.
     """
-    from optuna.distributions import FloatDistribution, IntDistribution
+    from optuna.trial import TrialState
 
-    return {
-        parameter: IntDistribution(low, high)
-        if isinstance(low, int) and isinstance(high, int)
-        else FloatDistribution(low, high, log=True)
-        for parameter, (low, high) in search_space(name).items()
-    }
+    for left in _trials(study, TrialState.RUNNING):
+        with suppress(RuntimeError):  # it ended just now
+            study.tell(left.number, state=TrialState.FAIL, skip_if_finished=True)
+    if not _trials(study, TrialState.COMPLETE, TrialState.WAITING):
+        study.enqueue_trial({parameter: getattr(default, parameter) for parameter in default.SPACE})
+
+
+def _drawn(study: "optuna.Study", name: str, seed: int) -> "optuna.Trial":
+    """A new trial, whose parameters depend on the seed and on the trials before it.
+
+    How many these are is added to the seed, so that a search goes on as one that was never broken
+    off, and searches at the same time draw different trials, unless one has just begun.
+    """
+    from optuna.samplers import TPESampler
+    from optuna.trial import TrialState
+
+    trial = study.ask()
+    others = _trials(study, TrialState.COMPLETE, TrialState.RUNNING)
+    before = sum(other.number < trial.number for other in others)
+    study.sampler = TPESampler(seed=(seed + before) % 2**32)  # it takes no larger ones
+    with suppress(RuntimeError):  # see _begin
+        for parameter, (low, high) in search_space(name).items():
+            if isinstance(low, int) and isinstance(high, int):
+                trial.suggest_int(parameter, low, high)
+            else:
+                trial.suggest_float(parameter, low, high, log=True)
+    return trial

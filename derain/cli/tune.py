@@ -10,8 +10,8 @@ It writes them for `derain run --parameters` and `derain bench --methods`.
 
 Optuna searches the parameters of a filter, starting at the defaults. The neighbours of each scan
 are found once, and take about 150 bytes per point. With --storage, a second call continues up to
---trials, and simultaneous calls share the trials and find the same parameters. Several machines
-need a journal in a folder that all of them see, or a database:
+--trials, and simultaneous calls share the trials; call it once more at the end for the best of all.
+Several machines need a journal in a folder that all of them see, or a database:
 postgresql+psycopg://USER@HOST/DATABASE. With --candidates, the filter looks for rain only within
 bounds of range, height and intensity that hold a share of the rain. The threshold of a model
 follows from its probabilities, without trials.

@@ -2,21 +2,26 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import optuna
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
+from optuna.trial import TrialState
 
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
+from derain.export import tuning
 from derain.export.storage import Storage
 from derain.export.tuning import (
     LabelledNeighbourhoods,
     Tuned,
     neighbours_to_find,
+    pooled_iou,
     search_space,
     tune_filter,
     tune_threshold,
@@ -138,6 +143,56 @@ def test_a_stored_study_goes_on_with_the_same_scans_and_labels_alone(seen, tmp_p
             tune("dsor", scans, 9, storage, data)
     # Another filter has a study of its own in the same file.
     assert tune("ror", seen, 1, storage, data="b")[0].iou > 0
+
+
+def trials_of(storage: Path) -> list[tuple[dict[str, Any], list[float]]]:
+    """The complete trials of a search for DSOR's parameters."""
+    study = optuna.load_study(study_name="dsor", storage=Storage(str(storage)).open())
+    complete = study.get_trials(states=[TrialState.COMPLETE])
+    return [(trial.params, trial.values) for trial in complete]
+
+
+@pytest.mark.parametrize("ending", ["db", "journal"])
+@pytest.mark.parametrize("killed_at", [0, 3, 13])
+def test_a_search_that_was_killed_goes_on_as_one_that_was_not(
+    seen, tmp_path, monkeypatch, ending, killed_at
+) -> None:
+    whole, broken = tmp_path / f"whole.{ending}", tmp_path / f"broken.{ending}"
+    unbroken, _ = tune("dsor", seen, 16, whole)
+    computed = []
+
+    def killed(*arguments: Any) -> float:
+        if len(computed) == killed_at:
+            raise KeyboardInterrupt
+        computed.append(pooled_iou(*arguments))
+        return computed[-1]
+
+    with monkeypatch.context() as patched:
+        patched.setattr(tuning, "pooled_iou", killed)
+        with pytest.raises(KeyboardInterrupt):
+            tune("dsor", seen, 16, broken)
+    assert tune("dsor", seen, 16, broken) == (unbroken, 16 - killed_at)
+    assert trials_of(broken) == trials_of(whole)
+
+
+@pytest.mark.parametrize("begun_at", [0, 4, 15])
+def test_searches_at_the_same_time_share_the_trials(seen, tmp_path, monkeypatch, begun_at) -> None:
+    """Another one begins, and ends, while the first is at work on a trial."""
+    storage, computed, others = tmp_path / "study.db", [], []
+
+    def beside_another(*arguments: Any) -> float:
+        computed.append(pooled_iou(*arguments))
+        if len(computed) == begun_at + 1:
+            others.append(tune("dsor", seen, 16, storage)[0])
+        return computed[-1]
+
+    monkeypatch.setattr(tuning, "pooled_iou", beside_another)
+    tuned, _ = tune("dsor", seen, 16, storage)
+    trials = trials_of(storage)
+    assert len(trials) == 16
+    assert len({str(parameters) for parameters, _ in trials}) == 16
+    assert [tuned] == others
+    assert [tuned.iou] == max(iou for _, iou in trials)
 
 
 def test_a_journal_that_can_no_longer_grow_is_named(seen, tmp_path, full_disk) -> None:
