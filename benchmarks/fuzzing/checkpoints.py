@@ -109,10 +109,9 @@ HOSTILE: dict[str, Change] = {
     "callbacks in lists": lambda content: content["callbacks"].update(
         {key: [1] for key in content["callbacks"]}
     ),
-    "best checkpoints in a list": _of_each_callback("best_k_models", ["best.ckpt"]),
-    "scores that are texts": _of_each_callback("best_k_models", {"best.ckpt": "high"}),
-    "best checkpoint without a name": _of_each_callback("best_k_models", {"": 0.5}),
-    "folder that is a number": _of_each_callback("dirpath", 5),
+    "best checkpoint in a list": _of_each_callback("best_model_path", ["best.ckpt"]),
+    "score that is a text": _of_each_callback("best_model_score", "high"),
+    "best checkpoint without a name": _of_each_callback("best_model_path", ""),
     "loops in a list": _setting("loops", [1]),
     "no loop of a training": _dropping("loops", "fit_loop"),
     "progress that is a text": _setting(*PROGRESS, "far"),

@@ -4,13 +4,11 @@ import os
 import re
 import shutil
 from collections.abc import Mapping
-from contextlib import suppress
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
 import lightning
-import torch
 from lightning.pytorch.callbacks import ModelCheckpoint
 from torch import Tensor
 
@@ -22,15 +20,15 @@ from derain.system.notices import warn
 
 
 class BestCheckpoint(ModelCheckpoint):
-    """Keeps the best epochs, also of a run resumed in a folder of its own.
+    """Keeps the best epochs; a resumed run goes on with the best one before, in whichever folder.
 
     Lightning forgets what was best when the folder changes, and calls the first epoch there the
-    best, however poor. This one goes on with the scores and with copies of the files; those of the
-    earlier run stay.
+    best, however poor. This one goes on with the score and with a copy of the file; that of the
+    earlier run stays.
 
-    Lightning removes files that it has kept once there are better ones, and a checkpoint is not
-    trusted to name them. So they are looked for beside the checkpoint, or in the run's own folder
-    where it wrote there before, and only under names that this callback gives.
+    Lightning removes a file that it has kept once there is a better one, and a checkpoint is not
+    trusted to name it. So it is looked for beside the checkpoint, or in the run's own folder where
+    it wrote there before, and only under names that this callback gives.
     """
 
     _earlier: Mapping[str, Any] | None = None  # state of the run that this one goes on from
@@ -61,7 +59,7 @@ class BestCheckpoint(ModelCheckpoint):
         """Goes on with what was best before.
 
         Raises:
-            InputError: A state that holds no scores of checkpoints, or a copy cannot be written.
+            InputError: A state of no checkpoint and score, or a copy that cannot be written.
         """
         super().on_train_start(trainer, pl_module)
         if self._earlier is not None and not trainer.fast_dev_run:  # type: ignore[attr-defined]
@@ -69,72 +67,33 @@ class BestCheckpoint(ModelCheckpoint):
         self._earlier = None
 
     def _go_on_from(self, trainer: lightning.Trainer, earlier: Mapping[str, Any]) -> None:
-        before, scores = _folder_and_scores(earlier, trainer.ckpt_path)
-        folder = Path(trainer.ckpt_path or "").parent if before != self.dirpath else Path(before)
-        kept: dict[str, Tensor] = {}  # the best first
-        ranking = sorted(scores, key=lambda path: float(scores[path]), reverse=self.mode == "max")
-        for path in ranking[: None if self.save_top_k < 0 else self.save_top_k]:
-            name = os.path.relpath(path, before)
-            copy = os.path.join(str(self.dirpath), name)
-            if _copied(trainer, self._own_file(folder, name), copy):
-                kept[copy] = scores[path]
-            elif trainer.is_global_zero:
+        path, score = earlier.get("best_model_path"), earlier.get("best_model_score")
+        if score is None:
+            return  # there was none yet
+        if not (path and isinstance(path, str) and _is_score(score)):
+            raise InputError(
+                str(trainer.ckpt_path),
+                f"its best checkpoint is {shown(path)}, of the score {shown(score)}",
+                "Give a checkpoint that derain wrote.",
+            )
+        wrote_here, beside = earlier.get("dirpath") == self.dirpath, Path(trainer.ckpt_path or "")
+        found = (Path(str(self.dirpath)) if wrote_here else beside.parent) / Path(path).name
+        copy = os.path.join(str(self.dirpath), found.name)
+        pattern = re.sub(r"{.*?}", "*", self.filename or "*") + f"*{self.FILE_EXTENSION}"
+        is_there = fnmatch(found.name, pattern) and os.path.isfile(found)
+        if not trainer.strategy.broadcast(is_there):
+            if trainer.is_global_zero:
                 warn(f"{path}: not found; the best checkpoint is chosen from here on, without it")
-        if not kept:
             return
-        paths = list(kept)
-        super().load_state_dict(
-            {
-                "dirpath": self.dirpath,
-                "best_k_models": kept,
-                "best_model_path": paths[0],
-                "best_model_score": kept[paths[0]],
-                "kth_best_model_path": paths[-1],
-                "kth_value": kept[paths[-1]],
-            }
-        )
-
-    def _own_file(self, folder: Path, name: str) -> Path | None:
-        """A file in a folder if this callback may have written it there, else None."""
-        pattern = re.sub(r"{.*?}", "*", self.filename or "*")
-        if not fnmatch(name, f"{pattern}*{self.FILE_EXTENSION}"):
-            return None
-        with suppress(OSError, ValueError):  # what no file can be called
-            file = (folder / name).resolve()
-            if file.is_relative_to(folder.resolve()) and file.is_file():
-                return file
-        return None
-
-
-def _folder_and_scores(state: Mapping[str, Any], path: Any) -> tuple[str, dict[str, Tensor]]:
-    """The folder of the run that a state is of, and the scores of its checkpoints by their paths.
-
-    Raises:
-        InputError: The state holds something else.
-    """
-    folder, scores = state.get("dirpath"), state.get("best_k_models")
-    if (
-        isinstance(folder, str)
-        and isinstance(scores, dict)
-        and all(key and isinstance(key, str) and _is_score(scores[key]) for key in scores)
-    ):
-        return folder, scores
-    raise InputError(
-        str(path),
-        f"the scores of its best checkpoints are {shown(scores)}, in {shown(folder)}",
-        "Give a checkpoint that derain wrote.",
-    )
+        if trainer.is_global_zero and found != Path(copy):
+            with replacing(Path(copy)) as temporary:
+                shutil.copyfile(found, temporary)
+        self.best_k_models = {copy: score}
+        self.best_model_path = self.kth_best_model_path = copy
+        self.best_model_score = self.kth_value = score
 
 
 def _is_score(value: Any) -> bool:
-    if isinstance(value, Tensor):
-        return value.ndim == 0 and not value.is_complex() and not bool(torch.isnan(value))
-    return type(value) in (int, float) and value == value
-
-
-def _copied(trainer: lightning.Trainer, found: Path | None, copy: str) -> bool:
-    """Copies a checkpoint of an earlier run, in the first process; whether it was there."""
-    if trainer.is_global_zero and found is not None:
-        with replacing(Path(copy)) as temporary:
-            shutil.copyfile(found, temporary)
-    return bool(trainer.strategy.broadcast(found is not None))
+    if not isinstance(value, Tensor) or value.ndim > 0 or value.is_complex():
+        return False
+    return not bool(value.isnan())

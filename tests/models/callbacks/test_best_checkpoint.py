@@ -78,20 +78,16 @@ def weights(folder: Path) -> dict[str, float]:
 
 
 @pytest.mark.parametrize(
-    ("mode", "top", "writer"),
+    ("mode", "writer"),
     [
-        ("max", 1, BestCheckpoint),
-        ("max", 1, ModelCheckpoint),  # what derain wrote its checkpoints with at first
-        ("max", 2, BestCheckpoint),
-        ("min", 2, BestCheckpoint),
-        ("min", -1, BestCheckpoint),
+        ("max", BestCheckpoint),
+        ("max", ModelCheckpoint),  # what derain wrote its checkpoints with at first
+        ("min", BestCheckpoint),
     ],
 )
 @pytest.mark.parametrize("scores", [(3.0, 1.0, 2.0), (2.0, 3.0, 1.0)])
-def test_the_best_epochs_are_those_of_an_unbroken_run(
-    fit, tmp_path, scores, mode, top, writer
-) -> None:
-    options = {"mode": mode, "save_top_k": top, "filename": "{epoch}"}
+def test_the_best_epoch_is_that_of_an_unbroken_run(fit, tmp_path, scores, mode, writer) -> None:
+    options = {"mode": mode, "filename": "{epoch}"}
     unbroken = fit("unbroken", 3, scores, **options)
     fit("first", 1, scores, kind=writer, **options)
     before = contents(tmp_path / "first")
@@ -102,6 +98,17 @@ def test_the_best_epochs_are_those_of_an_unbroken_run(
     assert resumed.kth_value == unbroken.kth_value
     for path in ("best_model_path", "kth_best_model_path"):
         assert getattr(resumed, path) == getattr(unbroken, path).replace("unbroken", "second")
+
+
+@pytest.mark.parametrize("folder", ["first", "second"])
+def test_of_several_best_epochs_the_first_is_taken_over_and_none_is_lost(
+    fit, tmp_path, folder
+) -> None:
+    scores, options = (3.0, 4.0, 1.0), {"mode": "max", "save_top_k": 2, "filename": "{epoch}"}
+    fit("first", 2, scores, **options)
+    fit(folder, 3, scores, earlier="first", **options)
+    assert weights(tmp_path / folder).items() >= {"epoch=1.ckpt": 2, "epoch=2.ckpt": 3}.items()
+    assert weights(tmp_path / "first").items() >= {"epoch=0.ckpt": 1, "epoch=1.ckpt": 2}.items()
 
 
 @pytest.mark.parametrize(
@@ -147,6 +154,17 @@ def test_a_run_that_was_moved_goes_on_with_its_best(fit, tmp_path) -> None:
     (tmp_path / "first").rename(tmp_path / "moved")
     fit("second", 3, scores, earlier="moved", mode="max")
     assert weights(tmp_path / "second") == {"best.ckpt": 1}
+
+
+def test_a_run_whose_last_checkpoint_was_moved_goes_on_with_the_best_in_its_folder(
+    fit, tmp_path
+) -> None:
+    scores = (3.0, 1.0, 2.0)
+    fit("first", 1, scores, mode="max")
+    (tmp_path / "moved").mkdir()
+    (tmp_path / "first/last.ckpt").rename(tmp_path / "moved/last.ckpt")
+    fit("first", 3, scores, earlier="moved", mode="max")
+    assert weights(tmp_path / "first") == {"best.ckpt": 1}
 
 
 def test_a_run_whose_best_is_gone_starts_anew_with_a_warning(fit, tmp_path, capsys) -> None:
