@@ -27,12 +27,18 @@ class SegmentationLoss(NamedTuple):
 def segmentation_loss(logits: Tensor, target: Tensor, class_weight: Tensor) -> SegmentationLoss:
     """Weighted cross-entropy plus Lovász-softmax of two classes, as 3D-OutDet is trained.
 
-    It is the sum of :func:`weighted_cross_entropy` and :func:`lovasz_softmax`, several times
-    faster: both classes' errors at a point are one number, the probability of the other class, so
-    that one order serves both; and all follows from how far the logits lean to the wrong side.
+    The cross-entropy is a mean in which each point is weighted by its class. The other is the
+    Lovász extension of the Jaccard loss, 1 − IoU, averaged over the classes present: at hard 0/1
+    probabilities it is the mean 1 − IoU itself; where all points are of one class c, the mean of
+    1 − p_c. Both are 0 without points, and the first where no class present has a weight.
+
+    Both classes' errors at a point are one number, the probability of the other class, so that one
+    order serves both; and all follows from how far the logits lean to the wrong side.
 
     Source: sporsho/3D_OutDet, train_wads.py. SalsaNext (Cortinhal et al. 2020) learns from the same
-    sum, with the logarithm of probabilities clamped at 1e-8 in place of the log-softmax.
+    sum, with the logarithm of probabilities clamped at 1e-8 in place of the log-softmax. Berman,
+    Rannen Triki and Blaschko, "The Lovász-Softmax loss", CVPR 2018, definition 2 and the loss over
+    the classes present.
 
     Args:
         logits: Scores before the softmax, float (N, 2).
@@ -43,59 +49,14 @@ def segmentation_loss(logits: Tensor, target: Tensor, class_weight: Tensor) -> S
     lean = logits[:, 1] - logits[:, 0]
     wrong = torch.where(second, -lean, lean)
     weight = class_weight.to(wrong)[target]
-    cross_entropy = _weighted_mean(functional.softplus(wrong) * weight, weight)
+    total = weight.sum().clamp(min=torch.finfo(weight.dtype).tiny)  # 0 where all weights are
+    cross_entropy = (functional.softplus(wrong) * weight).sum() / total
     order = wrong.detach().argsort(descending=True)
     ordered = second[order]
     steps = _jaccard_steps(ordered, wrong.dtype) + _jaccard_steps(~ordered, wrong.dtype)
     present = second.any().int() + (~second).any().int()
     lovasz = (wrong.sigmoid()[order] * steps).sum() / present.clamp(min=1)
     return SegmentationLoss(cross_entropy + lovasz, cross_entropy, lovasz)
-
-
-def weighted_cross_entropy(logits: Tensor, target: Tensor, class_weight: Tensor) -> Tensor:
-    """Mean cross-entropy with each point weighted by its class.
-
-    It is what :func:`torch.nn.functional.cross_entropy` gives, except where that is 0 / 0: without
-    points, or where the classes of all points have a weight of 0. There it is 0, with gradient 0.
-
-    Args:
-        logits: Scores before the softmax, float (N, C).
-        target: Class of every point, 0 … C − 1, int64 (N,).
-        class_weight: Weight of each class, float (C,), at least 0.
-    """
-    logits = at_least_float32(logits)
-    class_weight = class_weight.to(logits)
-    total = functional.cross_entropy(logits, target, class_weight, reduction="sum")
-    return _weighted_mean(total, class_weight[target])
-
-
-def lovasz_softmax(probability: Tensor, target: Tensor) -> Tensor:
-    """Lovász extension of the Jaccard loss, 1 − IoU, averaged over the classes present.
-
-    At hard 0/1 probabilities it is the mean 1 − IoU itself. Where all points are of one class c,
-    as in a scan without rain or with nothing but rain, it is the mean of 1 − p_c. Without points
-    it is 0.
-
-    Source: Berman, Rannen Triki and Blaschko, "The Lovász-Softmax loss", CVPR 2018, definition 2
-    and the loss over the classes present.
-
-    Args:
-        probability: Probability of each class, float (N, C).
-        target: Class of every point, 0 … C − 1, int64 (N,).
-    """
-    probability = at_least_float32(probability)
-    foreground = functional.one_hot(target, probability.shape[1]).bool()
-    error = torch.where(foreground, 1 - probability, probability)
-    error, order = error.sort(dim=0, descending=True)
-    steps = _jaccard_steps(foreground.gather(0, order), error.dtype)
-    loss = (error * steps).sum(dim=0)  # 0 for a class without a point
-    present = foreground.any(dim=0).sum()
-    return loss.sum() / present.clamp(min=1)
-
-
-def _weighted_mean(weighted: Tensor, weight: Tensor) -> Tensor:
-    """Mean of values that are multiplied by their weights; 0 where all weights are 0."""
-    return weighted.sum() / weight.sum().clamp(min=torch.finfo(weight.dtype).tiny)
 
 
 def _jaccard_steps(foreground: Tensor, dtype: torch.dtype) -> Tensor:

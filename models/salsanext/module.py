@@ -15,7 +15,7 @@ from torch import Tensor, nn
 
 from derain.cards.card import DataCard
 from derain.errors import InputError
-from derain.learning.losses import SegmentationLoss, lovasz_softmax, weighted_cross_entropy
+from derain.learning.losses import SegmentationLoss, at_least_float32, segmentation_loss
 from derain.models.published import Published
 from derain.models.range_module import FITTED, per_pixel, range_view, require_grid
 from derain.models.registry import NETWORKS
@@ -140,8 +140,10 @@ class SalsaNextModule(SupervisedModule):
         if not self.hparams["published_loss"]:
             return super().segmentation_loss(logits, target)
         rain = target == 1
-        cross_entropy = weighted_cross_entropy(logits, rain.long(), self.class_weight)
-        lovasz = lovasz_softmax(logits[rain].float().softmax(dim=1), target[rain])
+        cross_entropy = segmentation_loss(logits, rain.long(), self.class_weight).cross_entropy
+        # Lovász-softmax over the pixels of rain alone, which are of one class.
+        missed = 1 - at_least_float32(logits)[rain].softmax(dim=1)[:, 1]
+        lovasz = missed.sum() / max(len(missed), 1)
         return SegmentationLoss(cross_entropy + lovasz, cross_entropy, lovasz)
 
     def configure_optimizers(self) -> OptimizerLRScheduler:
