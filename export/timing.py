@@ -92,34 +92,6 @@ def timed_runs(
     return RunTimes({stage: np.array([run.get(stage, 0.0) for run in runs]) for stage in STAGES})
 
 
-@dataclass(frozen=True)
-class Latency:
-    """Times of an exported model; as text, a table of their percentiles.
-
-    Attributes:
-        times: Milliseconds of every run.
-        points: Points of the scan.
-        threads: Threads of view and network.
-        versions: The processor, and the software that ran.
-    """
-
-    times: RunTimes
-    points: int
-    threads: int
-    versions: str
-
-    def __str__(self) -> str:
-        runs = len(self.times.total)
-        lines = [
-            f"{self.points:,} points, {self.threads} threads, {runs} runs, milliseconds",
-            "stage   " + "".join(f"{f'p{percentage}':>9}" for percentage in PERCENTILES),
-        ]
-        for name, stage in (*((stage, stage) for stage in self.times.stages), ("total", None)):
-            values = (self.times.percentile(percentage, stage) for percentage in PERCENTILES)
-            lines.append(f"{name:8}" + "".join(f"{value:9.1f}" for value in values))
-        return "\n".join([*lines, self.versions])
-
-
 def measure_latency(
     model: Path,
     scan: Path | None = None,
@@ -127,8 +99,8 @@ def measure_latency(
     threads: int = 0,
     repeats: int = 30,
     runtime: Runtime = Runtime(),
-) -> Latency:
-    """Times an exported model from file to mask.
+) -> str:
+    """Times an exported model from file to mask; a table of percentiles by stage, in milliseconds.
 
     Args:
         model: ONNX file.
@@ -148,8 +120,18 @@ def measure_latency(
         derainer = Derainer(model, threads, runtime.name, runtime.precision)
         frame = frame_of(scan, columns)
         times = timed_runs(derainer.probability, [frame], repeats)
-        software = versions([runtime.name])
-        return Latency(times, frame.count_points(), derainer.threads, software)
+        points = f"{frame.count_points():,} points, {derainer.threads} threads"
+    head = f"{points}, {repeats} runs, milliseconds"
+    return "\n".join([head, percentile_table(times), versions([runtime.name])])
+
+
+def percentile_table(times: RunTimes) -> str:
+    """Percentiles of the times of each stage and of them all, a line each."""
+    lines = ["stage   " + "".join(f"{f'p{percentage}':>9}" for percentage in PERCENTILES)]
+    for name, stage in (*((stage, stage) for stage in times.stages), ("total", None)):
+        values = (times.percentile(percentage, stage) for percentage in PERCENTILES)
+        lines.append(f"{name:8}" + "".join(f"{value:9.1f}" for value in values))
+    return "\n".join(lines)
 
 
 def versions(runtimes: Iterable[str] = (DEFAULT_RUNTIME,)) -> str:
