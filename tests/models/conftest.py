@@ -1,7 +1,7 @@
 """What the tests of models share."""
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, TypeVar
+from typing import Any
 
 import lightning
 import numpy as np
@@ -13,8 +13,7 @@ from torch import Tensor, nn
 from derain.cards.card import load_card
 from derain.datamodules.base import Loading
 from derain.datamodules.folder import Folder
-from derain.datamodules.in_memory import InMemory
-from derain.learning.batch import Batch, Sample
+from derain.learning.batch import Sample
 from derain.models.base import DerainingModule
 from derain.models.outdet import OutDet
 from derain.scan import Scan
@@ -124,33 +123,3 @@ def scenes(tmp_path) -> Callable[..., Folder]:
         return Folder(str(tmp_path), card, **parts, loading=Loading(**loading))
 
     return make
-
-
-Trained = TypeVar("Trained", bound=DerainingModule)
-
-
-def trained_on_scenes(
-    trainer: lightning.Trainer, make: Callable[[], Trained], labelled: Callable[[int], Scan]
-) -> Trained:
-    """Trains a model on a few labelled scenes of WADS's classes."""
-    lightning.seed_everything(0)
-    model = make()
-    train, validation = [labelled(seed) for seed in range(4)], [labelled(9)]
-    data = InMemory(train, validation, card="wads", loading=Loading(batch_size=2))
-    trainer.fit(model, data)
-    return model.eval()
-
-
-@pytest.fixture
-def judges_apart() -> Callable[..., None]:
-    """Asserts that a model judges scans in one batch as it judges each alone."""
-
-    def check(model: DerainingModule, *scans: Scan) -> None:
-        view = model.spec.make_view()
-        samples = [Sample(scan, view(scan), None) for scan in scans]
-        with torch.no_grad():
-            together = model.logits_of(Batch.of(samples))
-            alone = [model.logits_of(Batch.of([sample])) for sample in samples]
-        torch.testing.assert_close(together, torch.cat(alone))
-
-    return check
