@@ -59,7 +59,7 @@ class SimulatedDataModule(SequenceDataModule):
         """
         if self.make:
             with processes(self.workers) as executor:
-                simulate_track(self.root, self.campaign, executor, keep=False)
+                simulate_track(self.root, self.campaign, executor)
 
 
 class Simulated(SimulatedDataModule):

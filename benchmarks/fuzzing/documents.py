@@ -104,7 +104,7 @@ def readers() -> list[Reader]:
         yaml.safe_dump({"method": name, **filter_from(name, {}).as_dict()}) for name in FILTERS
     ]
     files = {"sequences/000/lidar_radar_pcd/000000.bin": 64 * "0"}
-    manifest = {**Campaign().description, "keep": True, "files": files}
+    manifest = {**Campaign().description, "files": files}
     return [
         _of_yaml("card", _read_card, [CARD, packaged_cards()["wads"].read_text()]),
         _of_yaml("scene", _read_scene, [SCENE]),

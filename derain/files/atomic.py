@@ -185,13 +185,12 @@ def remove_abandoned(folder: Path) -> None:
                 os.close(descriptor)
 
 
-def lock(descriptor: int, *, wait: bool, shared: bool = False) -> bool:
+def lock(descriptor: int, *, wait: bool) -> bool:
     """Locks an open file or folder, until it is closed, against all others that lock it here.
 
     Args:
         descriptor: The file or the folder.
         wait: True to wait for another process that holds it.
-        shared: True if others may hold it at the same time that share it, too.
 
     Returns:
         False where another holds it and is not waited for.
@@ -203,9 +202,8 @@ def lock(descriptor: int, *, wait: bool, shared: bool = False) -> bool:
         import fcntl
     except ImportError as error:
         raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS)) from error
-    kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
     try:
-        fcntl.flock(descriptor, kind | (0 if wait else fcntl.LOCK_NB))
+        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
     except BlockingIOError:
         return False
     return True

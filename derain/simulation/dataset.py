@@ -6,28 +6,24 @@ sequences/000/...   see :mod:`derain.simulation.sequence`
 
 A sequence is a unit of a job, and its folder appears when it is complete, so an interrupted run can
 resume. Each sequence has a random generator of its own, so interruptions, processes, shards and
-machines do not change a byte. If two runs use one folder, the second waits for the first; shards of
-one run do not wait for each other.
+machines do not change a byte. Two runs of one campaign in one folder write the same bytes; of two
+campaigns, the second is refused.
 """
 
 import hashlib
-import os
-import shutil
-import sys
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from derain.errors import InputError
-from derain.files.atomic import lock, remove_abandoned, temporary_folder, writing
+from derain.files.atomic import remove_abandoned, temporary_folder, writing
 from derain.jobs.job import FOLDER, Job, differences
 from derain.jobs.running import IsThere, Submits, Task, Value, ValueWork, values
 from derain.jobs.shard import Shard
 from derain.jobs.unit import Unit
 from derain.simulation.campaign import SplitSequences
-from derain.simulation.manifest import MANIFEST, parameters_of, read_manifest, write_manifest
+from derain.simulation.manifest import parameters_of, read_manifest, write_manifest
 from derain.system.open3d_import import import_open3d
 
 SEQUENCES = "sequences"
@@ -38,8 +34,6 @@ def simulate_track(
     campaign: SplitSequences,
     executor: Submits | None = None,
     shard: Shard | None = None,
-    *,
-    keep: bool = True,
 ) -> bool:
     """Simulates a data set, or its missing parts.
 
@@ -49,8 +43,6 @@ def simulate_track(
         executor: Simulates the sequences; None does it in this process.
         shard: The shard of the sequences that is simulated; None for all. Whoever does the last
             shard completes the manifest.
-        keep: True if the data set is a person's. One that a program made for its own use, without
-            it, is replaced where the program simulates another campaign in the folder.
 
     Returns:
         Whether the data set is complete; False while other shards are to be simulated.
@@ -61,32 +53,28 @@ def simulate_track(
             half-written.
     """
     campaign = campaign.resolved()  # reports a wrong file first
-    description = {**campaign.description, "keep": keep}
-    with _locked(root, shared=shard is not None):
-        there = read_manifest(root)
-        if not (keep or there.get("keep")) and there and not _describes(there, campaign):
-            _remove(root)
-            there = {}
-        _refuse_others(root, there, campaign)
-        if "files" in there and all((root / SEQUENCES / name).is_dir() for name in campaign.names):
-            return True
-        import_open3d()  # raises where it is missing, before anything is written
-        # The manifest comes first: a folder with content but without one is refused.
-        if there != description:
-            write_manifest(root, description)
-        # Absolute, because other processes may work in another folder.
-        work = SequenceWork(root.absolute(), campaign)
-        options = {"command": "simulate", **parameters_of(description)}
-        units = [Unit(id=name, size=1, inputs="") for name in campaign.names]
-        job, to_do = Job.begin(work.root, options, units, shard)
-        outcomes = values(Task(job, work), units, to_do, executor, "simulating", "sequence")
-        if outcomes is None:
-            return False
-        files: dict[str, str] = {}
-        for checksums_of_sequence in outcomes:
-            files |= checksums_of_sequence
-        write_manifest(root, {**description, "files": files})
+    description = campaign.description
+    _make(root)
+    there = _begun(root, description)
+    if "files" in there and all((root / SEQUENCES / name).is_dir() for name in campaign.names):
         return True
+    import_open3d()  # raises where it is missing, before anything is written
+    # Absolute, because other processes may work in another folder.
+    work = SequenceWork(root.absolute(), campaign)
+    options = {"command": "simulate", **parameters_of(description)}
+    units = [Unit(id=name, size=1, inputs="") for name in campaign.names]
+    # The job comes before the manifest: of two campaigns that begin at once, it refuses the second.
+    job, to_do = Job.begin(work.root, options, units, shard)
+    if there != description:
+        write_manifest(root, description)
+    outcomes = values(Task(job, work), units, to_do, executor, "simulating", "sequence")
+    if outcomes is None:
+        return False
+    files: dict[str, str] = {}
+    for checksums_of_sequence in outcomes:
+        files |= checksums_of_sequence
+    write_manifest(root, {**description, "files": files})
+    return True
 
 
 @dataclass(frozen=True)
@@ -132,49 +120,29 @@ def _checksums(folder: Path, root: Path) -> dict[str, str]:
     }
 
 
-def _remove(root: Path) -> None:
-    """Removes a data set."""
-    with writing(root):
-        # The manifest goes last. Without it the folder would be taken for somebody else's, should
-        # this run be killed in between; the sequences may then be gone already.
-        for name in (SEQUENCES, FOLDER):
-            if (root / name).exists():
-                shutil.rmtree(root / name)
-        (root / MANIFEST).unlink()
-
-
-@contextmanager
-def _locked(root: Path, *, shared: bool) -> Iterator[None]:
-    """Makes the folder and locks it, so that only one process at a time simulates in it.
-
-    Args:
-        root: The folder.
-        shared: True if the shards of one run may simulate in it at the same time.
-    """
+def _make(root: Path) -> None:
+    """Makes the folder, and removes what killed processes left in it."""
     if root.exists() and not root.is_dir():
         raise InputError(root, "is not a folder", "Name a new or empty folder.")
     with writing(root):
         root.mkdir(parents=True, exist_ok=True)
-    with ExitStack() as held:
-        with suppress(OSError):  # without locks two runs on one folder do not wait for each other
-            folder = os.open(root, os.O_RDONLY)
-            held.callback(os.close, folder)
-            if not lock(folder, wait=False, shared=shared):
-                print(f"derain: waits for another run that simulates in {root}", file=sys.stderr)
-                lock(folder, wait=True, shared=shared)
-        remove_abandoned(root)
-        yield
+    remove_abandoned(root)
 
 
-def _describes(manifest: Mapping[str, Any], campaign: SplitSequences) -> bool:
-    return manifest.items() >= campaign.description.items()
+def _begun(root: Path, description: Mapping[str, Any]) -> dict[str, Any]:
+    """The manifest of a folder that holds part of this data set; empty if it holds nothing.
 
-
-def _refuse_others(root: Path, there: Mapping[str, Any], campaign: SplitSequences) -> None:
-    if there and not _describes(there, campaign):
-        changed = differences(parameters_of(there), parameters_of(campaign.description))
+    Raises:
+        InputError: The folder holds something else.
+    """
+    # Looked for before the manifest is read, which another run may be about to write.
+    others = any(not file.name.startswith(FOLDER) for file in root.iterdir())
+    there = read_manifest(root)
+    if there and not there.items() >= description.items():
+        changed = differences(parameters_of(there), parameters_of(description))
         reason = f"holds a simulated data set of other parameters: {changed}"
         raise InputError(root, reason, "Name another folder, or delete this one.")
-    if not there and any(root.iterdir()):
+    if others and not there:
         reason = "holds something other than a simulated data set"
         raise InputError(root, reason, "Name a new or empty folder.")
+    return there

@@ -22,9 +22,8 @@ MAKER = "derain.simulation"
 # Parts of its split.
 SPLIT_PARTS = ("train", "validation", "test")
 
-# Keys of the sequences of each part, of the rain rate of each sequence, of the checksums by path,
-# and of whether the data set is a person's own.
-SPLIT, RAIN_RATE, FILES, KEEP = "split", "rain_rate_mm_h", "files", "keep"
+# Keys of the sequences of each part, of the rain rate of each sequence, and of the checksums by path.
+SPLIT, RAIN_RATE, FILES = "split", "rain_rate_mm_h", "files"
 
 # In bytes. The entry of a file takes 130, so that half a million files fit.
 LARGEST_MANIFEST = 2**26
@@ -52,7 +51,6 @@ def read_manifest(root: Path) -> dict[str, Any]:
         SPLIT: lambda parts: parts.record(dict.fromkeys(SPLIT_PARTS, Entry.texts), SPLIT_PARTS),
         RAIN_RATE: rates_of_sequences,
         FILES: lambda files: files.each(Entry.text),
-        KEEP: Entry.truth,
     }
     for key, read in parsers.items():
         if key in values:
@@ -79,7 +77,7 @@ def parameters_of(manifest: Mapping[str, Any], within: str = "") -> dict[str, An
     """
     found: dict[str, Any] = {}
     for name, value in manifest.items():
-        if within + name in (SPLIT, RAIN_RATE, FILES, KEEP):
+        if within + name in (SPLIT, RAIN_RATE, FILES):
             continue
         if isinstance(value, dict):
             found |= parameters_of(value, f"{within}{name}.")

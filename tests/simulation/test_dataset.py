@@ -1,6 +1,5 @@
 """The data set that the simulation writes: whole, resumable, the same by workers and shards."""
 
-import fcntl
 import hashlib
 import json
 import os
@@ -9,6 +8,7 @@ import sys
 import threading
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ from derain.jobs.job import job_status
 from derain.jobs.shard import Shard
 from derain.jobs.workers import WorkerPool
 from derain.scan import Bools, Float32s, Scan
-from derain.simulation import sequence
+from derain.simulation import dataset, sequence
 from derain.simulation.campaign import Campaign
 from derain.simulation.classes import TrackClass
 from derain.simulation.dataset import simulate_track
@@ -87,7 +87,7 @@ def test_the_manifest_describes_the_campaign_and_every_other_file_and_names_no_f
     manifest, there = read_manifest(track), contents(track)
     del there["manifest.json"]
     checksums = {name: hashlib.sha256(content).hexdigest() for name, content in there.items()}
-    assert manifest == {**TINY.description, "keep": True, "files": checksums}
+    assert manifest == {**TINY.description, "files": checksums}
     assert str(track.parent) not in json.dumps(manifest)
 
 
@@ -135,39 +135,40 @@ def test_a_data_set_that_is_there_is_not_made_twice_with_and_without_locks(
     before = times(track)
     simulate_track(track, TINY)
     monkeypatch.setitem(sys.modules, "fcntl", None)
-    simulate_track(track, TINY, keep=False)
+    simulate_track(track, TINY)
     assert times(track) == before
 
 
-def test_a_second_run_waits_for_the_first(track, tmp_path, capsys) -> None:
-    root = tmp_path / "track"
-    root.mkdir()
-    first = os.open(root, os.O_RDONLY)
-    fcntl.flock(first, fcntl.LOCK_EX)
-    second = threading.Thread(target=simulate_track, args=(root, TINY))
-    second.start()
-    second.join(0.5)
-    assert second.is_alive()
-    shutil.copytree(track, root, dirs_exist_ok=True)  # what the first run writes
-    before = times(root)
-    os.close(first)
-    second.join(60)
-    assert times(root) == before
-    assert capsys.readouterr().err.startswith("derain: waits for another run")
-
-
-def test_a_data_set_made_for_a_program_is_replaced_by_that_of_another_campaign(
-    open3d, tmp_path
+@pytest.mark.parametrize("seed", [0, 1])
+def test_two_runs_that_begin_at_once_write_the_same_or_the_second_is_refused(
+    track, tmp_path, monkeypatch, seed
 ) -> None:
-    root, scan = tmp_path / "track", "sequences/000/lidar_radar_pcd/000000.bin"
-    written = set()
-    for seed in (0, 1, 2):
-        simulate_track(root, replace(ONE, seed=seed), keep=False)
-        assert read_manifest(root)["campaign"]["seed"] == seed
-        written.add((root / scan).read_bytes())
-        if seed == 1:  # as a replacement leaves it that is killed
-            shutil.rmtree(root / "sequences")
-    assert len(written) == 3
+    root, both = tmp_path / "track", threading.Barrier(2)
+    refused = list[InputError]()
+
+    def read_at_once(root: Path) -> dict[str, Any]:
+        there = read_manifest(root)
+        both.wait(60)
+        return there
+
+    def simulate(campaign: Campaign) -> None:
+        try:
+            simulate_track(root, campaign)
+        except InputError as error:
+            refused.append(error)
+
+    monkeypatch.setattr(dataset, "read_manifest", read_at_once)
+    campaigns = TINY, replace(TINY, seed=seed)
+    runs = [threading.Thread(target=simulate, args=(campaign,)) for campaign in campaigns]
+    for run in runs:
+        run.start()
+    for run in runs:
+        run.join()
+    assert [str(error).count("seed was") for error in refused] == [1] * seed
+    written = read_manifest(root)
+    assert "files" in written
+    if not written["campaign"]["seed"]:
+        assert contents(root) == contents(track)
 
 
 def test_what_others_made_or_cannot_be_is_left_alone(track, tmp_path) -> None:
@@ -180,9 +181,8 @@ def test_what_others_made_or_cannot_be_is_left_alone(track, tmp_path) -> None:
         (tmp_path / "thesis.txt", TINY, "is not a folder"),
         (tmp_path / "new", replace(TINY, sensor="mars"), "mars: no such sensor"),
     ):
-        for keep in (True, False):
-            with pytest.raises(InputError, match=reason):
-                simulate_track(root, campaign, keep=keep)
+        with pytest.raises(InputError, match=reason):
+            simulate_track(root, campaign)
     assert times(track) | times(tmp_path) == before
 
 

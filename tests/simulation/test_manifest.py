@@ -10,7 +10,7 @@ from derain.simulation.manifest import MAKER, read_manifest, write_manifest
 
 def test_a_manifest_comes_back(tmp_path) -> None:
     files = {f"sequences/{n // 500:03d}/velodyne/{n:06d}.bin": 64 * "0" for n in range(20_000)}
-    content = {**Campaign().description, "keep": True, "files": files}
+    content = {**Campaign().description, "files": files}
     write_manifest(tmp_path, content)
     assert read_manifest(tmp_path) == content
 
@@ -43,7 +43,6 @@ def test_what_derain_did_not_write_is_no_manifest_of_its(tmp_path, text) -> None
         ("rain_rate_mm_h", {"000": 10**400}, "rain_rate_mm_h.000"),
         ("files", None, "files"),
         ("files", {"a": 1}, "files.a"),
-        ("keep", "no", "keep"),
     ],
 )
 def test_a_manifest_with_a_value_of_another_kind_is_refused(tmp_path, key, value, where) -> None:
