@@ -43,19 +43,6 @@ MOST_TRAFFIC = 20
 LONGEST = 2000.0
 
 
-# Attributes that the sensors of earlier manifests do not have.
-LATER_ATTRIBUTES = (
-    "row_azimuths",
-    "pattern",
-    "prism_turns",
-    "tilt",
-    "defects",
-    "range_noise_growth",
-    "weak_range_noise",
-    "encoder_noise",
-)
-
-
 @dataclass(frozen=True)
 class Drive:
     """A drive along a street, or a sensor at rest in it while others move.
@@ -272,12 +259,6 @@ class Campaign(SplitSequences):
     def description(self) -> dict[str, Any]:
         """Everything that the files depend on, as reading it back from JSON gives it."""
         campaign = asdict(replace(self, sensor=self.lidar))
-        if self.drive is None:
-            del campaign["drive"]  # as in the manifests of before there were drives
-        usual = asdict(Sensor())
-        for name in LATER_ATTRIBUTES:  # likewise
-            if campaign["sensor"][name] == usual[name]:
-                del campaign["sensor"][name]
         return self._described(campaign=campaign, split=self.split) | {RAIN_RATE: self.rain_rate}
 
 

@@ -22,7 +22,7 @@ MAKER = "derain.simulation"
 # Parts of its split.
 SPLIT_PARTS = ("train", "validation", "test")
 
-# Keys of the sequences of each part, of the rain rate of each sequence, and of the checksums by path.
+# Keys of the sequences of each part, of the rain rate of each sequence, of the checksums by path.
 SPLIT, RAIN_RATE, FILES = "split", "rain_rate_mm_h", "files"
 
 # In bytes. The entry of a file takes 130, so that half a million files fit.

@@ -8,9 +8,7 @@ import pytest
 
 from derain.errors import InputError
 from derain.simulation.campaign import Campaign, Drive, partition
-from derain.simulation.defects import Defects
 from derain.simulation.radar import Radar
-from derain.simulation.sensor import Sensor
 
 
 def test_the_split_covers_every_sequence_once() -> None:
@@ -30,15 +28,6 @@ def test_the_description_differs_between_campaigns_and_is_json() -> None:
         assert replace(Campaign(), **change).description != plain
     # A sensor file may change under its name: its content counts.
     assert replace(Campaign(), sensor="mems_64").description == plain
-
-
-def test_what_few_campaigns_and_sensors_have_is_described_where_one_has_it() -> None:
-    plain = Campaign().description["campaign"]
-    rare = Campaign(drive=Drive(13, 4), sensor=Sensor(tilt=(0, 5), defects=Defects(copies=1)))
-    described = rare.description["campaign"]
-    assert described["drive"] == {"speed": 13, "traffic": 4, "skew": False}
-    assert set(described) - set(plain) == {"drive"}
-    assert set(described["sensor"]) - set(plain["sensor"]) == {"tilt", "defects"}
 
 
 def test_sequences_are_parted_as_those_of_rehearse_3d() -> None:
