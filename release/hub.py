@@ -10,13 +10,13 @@ import argparse
 import re
 import shutil
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from derain.default import ModelCard, ModelScore, default_checkpoint, default_model, model_card
+from derain.default import ModelCard, default_checkpoint, default_model, model_card
 from derain.evaluation.text_tables import markdown_table, number_text
 from derain.files.atomic import write_text
 
@@ -57,15 +57,14 @@ def front_matter(card: ModelCard) -> dict[str, Any]:
     }
 
 
-def _result(score: ModelScore) -> dict[str, Any]:
-    measured = {name: getattr(score, name) for name in METRICS}
+def _result(score: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "task": dict(TASK),
-        "dataset": {"type": _identifier(score.data), "name": score.data},
+        "dataset": {"type": _identifier(score["data"]), "name": score["data"]},
         "metrics": [
-            {"type": name, "name": METRICS[name], "value": value}
-            for name, value in measured.items()
-            if value is not None
+            {"type": name, "name": METRICS[name], "value": score[name]}
+            for name in METRICS
+            if name in score
         ],
     }
 
@@ -82,7 +81,7 @@ def page(card: ModelCard, repository: str) -> str:
         repository: Address of derain's repository.
     """
     rows = [
-        [score.data, number_text(score.iou), number_text(score.taken, ".3%")]
+        [score["data"], number_text(score.get("iou")), number_text(score.get("taken"), ".3%")]
         for score in card.scores
     ]
     parts = [
@@ -118,7 +117,7 @@ def write(out: Path) -> None:
     """Writes the folder, made if missing; files of these names are replaced.
 
     Raises:
-        InputError: The model or its card is damaged, or the folder cannot be written.
+        InputError: The model is damaged, or the folder cannot be written.
     """
     project = tomllib.loads(PYPROJECT.read_text("utf-8"))["project"]
     text = page(model_card(), project["urls"]["Repository"])

@@ -26,7 +26,8 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from textwrap import indent, wrap
 from typing import Any
@@ -39,7 +40,7 @@ from derain.cli.info_folder import draw, facts_of_folder
 from derain.cli.options import add_columns, add_topic
 from derain.cli.outputs import print_lines
 from derain.cli.unit_options import add_executor, add_shard, executor_of
-from derain.default import DEFAULT, ModelCard, ModelScore, default_model, model_card
+from derain.default import DEFAULT, ModelCard, default_model, model_card
 from derain.errors import InputError, printable
 from derain.evaluation.text_tables import number_text, plain_table
 from derain.example import or_example
@@ -157,7 +158,7 @@ def _describe_default(as_json: bool) -> None:
         raise InputError(DEFAULT, reason, remedy)
     model, card = default_model(), model_card()
     if as_json:
-        print(json.dumps({"file": str(model), **card.as_dict()}))
+        print(json.dumps({"file": str(model), **asdict(card)}))
     else:
         print_lines(card_as_text(card, model.stat().st_size))
 
@@ -238,9 +239,12 @@ def card_as_text(card: ModelCard, size: int) -> str:
     return "\n".join(lines)
 
 
-def _scores(scores: Sequence[ModelScore]) -> str:
+def _scores(scores: Sequence[Mapping[str, Any]]) -> str:
     """A table of scores: a line of headings, and a line for each data set."""
     if not scores:
         return "    not measured"
-    rows = [[one.data, number_text(one.iou), number_text(one.taken, ".3%")] for one in scores]
+    rows = [
+        [one["data"], number_text(one.get("iou")), number_text(one.get("taken"), ".3%")]
+        for one in scores
+    ]
     return indent(plain_table([["", "IoU", "taken"], *rows]), "  ")

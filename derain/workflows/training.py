@@ -29,7 +29,6 @@ from derain.datamodules.simulated import Simulated
 from derain.datamodules.taught import Taught
 from derain.datamodules.wads import Wads
 from derain.datamodules.worlds import Worlds
-from derain.default import LARGEST_SEED
 from derain.errors import InputError, reason_of
 from derain.files.atomic import replacing
 from derain.files.documents import Entry
@@ -69,6 +68,9 @@ FOUND_BY_LIGHTNING = ("last", "hpc")
 # The logger of messages that one process of several writes, and those above all of Lightning's.
 MESSAGES = logging.getLogger("lightning.pytorch.utilities.rank_zero")
 LOGGERS = ("lightning.pytorch", "lightning.fabric")
+
+# No seed of a random generator is larger.
+LARGEST_SEED = 2**32 - 1
 
 # The least of numbers that torch, Lightning and the callbacks take as they are.
 LEAST = {
