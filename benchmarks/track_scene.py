@@ -102,7 +102,8 @@ def _plane_near(points: Floats) -> Plane:
 
 def _rise_over(area: Rectangle, ground: Plane, triangles: Floats) -> Bools:
     """Which triangles (T, 3, 3) rise above the ground, and may reach into an area."""
-    relative, reach = area.relative(triangles[..., :2]), np.array(area.size) / 2
+    relative = (triangles[..., :2] - area.centre) @ _axes(area.heading)
+    reach = np.array(area.size) / 2
     apart = (relative.min(axis=1) > reach) | (relative.max(axis=1) < -reach)
     height = ground.height(triangles.reshape(-1, 3)).reshape(-1, 3).max(axis=1)
     rising: Bools = ~apart.any(axis=1) & (height > BOX_CLEARANCE)

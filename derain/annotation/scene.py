@@ -49,35 +49,12 @@ class Rectangle:
     size: tuple[float, float]
     heading: float
 
-    def relative(self, points: Floats) -> Floats:
-        """Positions of points in the rectangle's frame: ahead and left of its centre.
-
-        Args:
-            points: float64 (..., 2), metres.
-
-        Returns:
-            float64 (..., 2), metres.
-        """
-        x, y = points[..., 0] - self.centre[0], points[..., 1] - self.centre[1]
-        (cosine, _), (sine, _) = self._axes
-        return np.stack([cosine * x + sine * y, cosine * y - sine * x], axis=-1)
-
-    def contains(self, points: Floats) -> Bools:
-        """True for points, float64 (N, 2), metres, inside or on the outline; bool (N,)."""
-        ahead, left = self.relative(points).T
-        length, width = self.size
-        return np.asarray((np.abs(ahead) <= length / 2) & (np.abs(left) <= width / 2))
-
     def corners(self) -> Floats:
         """Its corners x, y in order, float64 (4, 2), metres."""
         halves = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) / 2
-        return (halves * self.size) @ self._axes.T + self.centre
-
-    @property
-    def _axes(self) -> Floats:
-        """Directions ahead and left as columns, (2, 2)."""
         cosine, sine = np.cos(np.radians(self.heading)), np.sin(np.radians(self.heading))
-        return np.array([[cosine, -sine], [sine, cosine]])
+        ahead_and_left = np.array([[cosine, sine], [-sine, cosine]])
+        return (halves * self.size) @ ahead_and_left + self.centre
 
 
 @dataclass(frozen=True)
@@ -102,7 +79,7 @@ class Box:
         return Rectangle(self.centre[:2], self.size[:2], self.heading)
 
     def contains(self, points: Floats) -> Bools:
-        """True for points that lie in the box or on its faces.
+        """True for points that lie in the box; one exactly on a side may count as in it or not.
 
         Args:
             points: x, y and z, float64 (N, 3), metres, sensor frame.
@@ -110,9 +87,8 @@ class Box:
         Returns:
             bool (N,).
         """
-        inside = self.footprint.contains(points[:, :2])
-        inside &= np.abs(points[:, 2] - self.centre[2]) <= self.size[2] / 2
-        return inside
+        level = np.abs(points[:, 2] - self.centre[2]) <= self.size[2] / 2
+        return np.asarray(level & inside(self.footprint.corners(), points))
 
     def corrected(self, shift: Triple = (0.0, 0.0, 0.0), **others: Any) -> "Box":
         """The box with a correction applied.
@@ -157,7 +133,7 @@ class Scene:
         return replace(self, boxes=boxes, corrections={})
 
 
-def inside(polygon: Polygon, points: Floats) -> Bools:
+def inside(polygon: Polygon | Floats, points: Floats) -> Bools:
     """True for points that lie in a polygon, seen from above.
 
     Args:
