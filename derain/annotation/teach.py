@@ -1,9 +1,7 @@
 """Labels recordings by a method, and writes the labels, their data card and their manifest."""
 
 import os
-import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -27,9 +25,8 @@ from derain.annotation.manifest import (
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.answers import NOT_KNOWN, TEACHERS_ANSWERS, Answers, TruthRecord
-from derain.files.atomic import replacing, temporary_folder, write_text, writing
+from derain.files.atomic import write_text
 from derain.files.labels import LABEL, write_labels
-from derain.jobs.job import FOLDER
 from derain.jobs.running import IsThere, Submits, Task, completed, run
 from derain.scan import Ints
 from derain.sources.file_frame import FileFrame
@@ -98,12 +95,12 @@ class Labelling(UnitJudging[LabelledScan]):
     """Labels the scans of one unit after the other, also those without any known point.
 
     Attributes:
-        folder: Folder for the labels, as of :func:`derain.annotation.manifest.label_path`.
+        out: Folder of the teaching.
         card: Data card of the scans, whose own labels measure the method's; None where there is
             none.
     """
 
-    folder: Path
+    out: Path
     card: DataCard | None
 
     def do(self, unit: FrameUnit) -> Iterator[LabelledScan]:
@@ -112,9 +109,9 @@ class Labelling(UnitJudging[LabelledScan]):
         yield from self.results(unlabelled, partial(self._labelled, unit))
 
     def look(self) -> IsThere[FrameUnit, LabelledScan]:
-        """True if all scans of a unit have labels."""
+        """True if all scans of a unit have labels of which anything is known."""
         return lambda unit, labelled: all(
-            label_path(self.folder, frame.key).exists() for frame in unit.frames
+            label_path(self.out, scan.frame.key).exists() for scan in labelled if scan.is_known
         )
 
     def failure(self, frame: Frame, error: InputError) -> LabelledScan:
@@ -135,7 +132,6 @@ class Labelling(UnitJudging[LabelledScan]):
         self, unit: FrameUnit, unlabelled: Frame, judgement: Judgement, stopwatch: Stopwatch
     ) -> LabelledScan:
         frame, labels = unit.by_key[unlabelled.key], labels_of(judgement)
-        write_labels(label_path(self.folder, frame.key), labels)
         issues = [*self.method.issues(judgement), *much_removed(judgement.share_of_rain)]
         truth = None
         if self.card is not None and frame.has_labels:
@@ -144,7 +140,10 @@ class Labelling(UnitJudging[LabelledScan]):
             except InputError as error:
                 issues.append(ScanIssue("own labels not measured", f"not measured: {error}"))
         answers = Answers.of(judgement.scan.with_label(labels), TAUGHT_CARD)
-        return LabelledScan(frame, answers, dict(stopwatch.milliseconds), truth, issues)
+        labelled = LabelledScan(frame, answers, dict(stopwatch.milliseconds), truth, issues)
+        if labelled.is_known:
+            write_labels(label_path(self.out, frame.key), labels)
+        return labelled
 
 
 # Receives each labelled scan.
@@ -164,8 +163,8 @@ def teach(
     """Labels recordings: 0 is not rain, 1 rain, 255 not known.
 
     Labels of the scans never change the result. Scans of which nothing is known are left out: they
-    neither train nor measure a student. The folder stays unchanged until every scan is judged, but
-    for the hidden folder in which the labels wait where records are kept.
+    neither train nor measure a student. Until every scan is judged, the manifest is marked as not
+    finished, and nobody can read it.
 
     Args:
         method: The teacher.
@@ -182,8 +181,7 @@ def teach(
             processes find all files by the same paths. None does them in this process.
 
     Returns:
-        The manifest. It is not finished, and nothing is in its place, while other shards of the
-        units are to be done.
+        The manifest. It is not finished while other shards of the units are to be done.
 
     Raises:
         InputError: Scans that are in no files, or whose paths are not UTF-8; a folder that holds
@@ -192,28 +190,27 @@ def teach(
             records of other options in the folder; an executor that has ended.
     """
     refuse_to_overwrite(out, source)
-    fingerprint = method.fingerprint()
-    if division is not None and division.keeps_records(source, out):
-        place = out.absolute()  # other processes may work in another folder
-        # The labels of all scans stay there, and are linked to where they belong.
-        work = Labelling(method, fingerprint, place / FOLDER, card)
-        options = work.options("teach", source, division.block)
-        options["card"] = None if card is None else card.name
-        units = units_of(source, method, division.block)
-        job, shard = division.begin(place, options, units)
-        task = Task(job, work)
-        results = (result for _, result, _ in run(task, shard, executor))
-        frames = _known(results, sum(len(unit.frames) for unit in shard), guard, watch)
-        if division.shard is not None:
-            scans = completed(task, units)
-            if scans is None:
-                return Manifest(method.as_dict(), finished=False)
-            frames = [scan.frame for scan in scans if scan.is_known]
-        return _finish(work, out, frames)
-    with _unfinished(out) as folder:
-        work = Labelling(method, fingerprint, folder, card)
+    # Absolute, because other processes may work in another folder.
+    work = Labelling(method, method.fingerprint(), out.absolute(), card)
+    unfinished = Manifest(method.as_dict(), finished=False)
+    if division is None or not division.keeps_records(source, out):
+        unfinished.write(out)
         frames = _known(work.do(whole(source)), len(source), guard, watch)
         return _finish(work, out, frames)
+    options = work.options("teach", source, division.block)
+    options["card"] = None if card is None else card.name
+    units = units_of(source, method, division.block)
+    job, shard = division.begin(work.out, options, units)
+    unfinished.write(out)
+    task = Task(job, work)
+    results = (result for _, result, _ in run(task, shard, executor))
+    frames = _known(results, sum(len(unit.frames) for unit in shard), guard, watch)
+    if division.shard is not None:
+        scans = completed(task, units)
+        if scans is None:
+            return unfinished
+        frames = [scan.frame for scan in scans if scan.is_known]
+    return _finish(work, out, frames)
 
 
 def _known(scans: Iterator[LabelledScan], total: int, guard: Guard, watch: Watch) -> list[Frame]:
@@ -231,14 +228,18 @@ def _known(scans: Iterator[LabelledScan], total: int, guard: Guard, watch: Watch
 
 
 def _finish(work: Labelling, out: Path, known: Sequence[Frame]) -> Manifest:
-    """Puts the labels, their card and the manifest in their place.
+    """Removes labels of earlier teachings, and writes the card and the manifest.
+
+    Two commands that do the last shards may do it at once.
 
     Raises:
         InputError: Nothing is known of any scan.
     """
     frames = [frame for frame in known if isinstance(frame, FileFrame)]  # all are in files
     if not frames:
-        reason = "nothing is written, because in every scan the method fails or is sure of no point"
+        reason = (
+            "no labels are written, because in every scan the method fails or is sure of no point"
+        )
         remedy = "Check that the method suits the scans: some need several scans of one recording."
         raise InputError(out, reason, remedy)
     manifest = Manifest(
@@ -250,7 +251,12 @@ def _finish(work: Labelling, out: Path, known: Sequence[Frame]) -> Manifest:
         frames[0].columns,
         frames[0].intensity_scale,
     )
-    _put_in_place(work.folder, out, manifest, work.card)
+    labels = {label_path(out, scan.key) for scan in manifest.scans}
+    for written in (out / LABELS).rglob(f"*{LABEL}"):
+        if written not in labels:
+            written.unlink(missing_ok=True)
+    write_card(out / CARD, Path(manifest.teacher["method"]).stem, work.card)
+    manifest.write(out)
     return manifest
 
 
@@ -303,39 +309,6 @@ def refuse_to_overwrite(out: Path, source: Source) -> None:
         if os.path.lexists(out / name):
             reason = "exists, and `derain teach` did not write it"
             raise InputError(out / name, reason, "Give --out another folder.")
-
-
-def _put_in_place(folder: Path, out: Path, manifest: Manifest, card: DataCard | None) -> None:
-    """Replaces the folder's contents; if it is interrupted, the manifest is marked unfinished.
-
-    Two commands that do the last shards may do it at once.
-    """
-    Manifest(manifest.teacher, finished=False).write(out)
-    labels = {label_path(out, scan.key): label_path(folder, scan.key) for scan in manifest.scans}
-    for earlier in (out / LABELS).rglob(f"*{LABEL}"):
-        if earlier not in labels:
-            earlier.unlink(missing_ok=True)
-    for target, written in labels.items():
-        with replacing(target) as temporary:
-            try:
-                os.link(written, temporary)
-            except OSError:  # a file system without links
-                shutil.copyfile(written, temporary)
-    write_card(out / CARD, Path(manifest.teacher["method"]).stem, card)
-    manifest.write(out)
-
-
-@contextmanager
-def _unfinished(out: Path) -> Iterator[Path]:
-    """Lends a temporary hidden folder in another, which is removed if it is new and stays empty."""
-    there = out.is_dir()
-    try:
-        with writing(out), temporary_folder(out) as folder:
-            yield folder
-    finally:
-        if not there:
-            with suppress(OSError):
-                out.rmdir()
 
 
 def labels_of(judgement: Judgement) -> NDArray[np.uint32]:

@@ -124,21 +124,25 @@ def test_a_second_teaching_takes_the_place_of_the_first(drive, tmp_path) -> None
 
 
 @pytest.mark.parametrize("there", [True, False])
-def test_what_fails_half_way_leaves_what_was_there(drive, tmp_path, there) -> None:
-    out = tmp_path / "taught"
+def test_what_fails_half_way_is_not_complete_until_it_is_taught_again(
+    drive, tmp_path, there
+) -> None:
+    out, scan = tmp_path / "taught", drive / "000003.bin"
+    teach(Between(), of(drive), tmp_path / "whole")
     if there:
-        teach(Between(), of(drive), out)
-    before = contents(out)
-    (drive / "000003.bin").write_bytes(b"12345")
+        teach(FilterDerainer(DROR(), 1), of(drive), out)
+    content = scan.read_bytes()
+    scan.write_bytes(b"12345")
     with pytest.raises(InputError, match="000003"):
         teach(Between(), of(drive), out)
-    assert contents(out) == before
-    assert out.exists() == there
+    with pytest.raises(InputError, match="its labels are not complete"):
+        Manifest.read(out)
+    scan.write_bytes(content)
+    teach(Between(), of(drive), out)
+    assert contents(out) == contents(tmp_path / "whole")
 
 
-def test_what_is_interrupted_while_it_is_put_in_place_is_known(
-    drive, tmp_path, monkeypatch
-) -> None:
+def test_what_is_interrupted_at_its_end_is_known(drive, tmp_path, monkeypatch) -> None:
     out = tmp_path / "taught"
     teach(Between(), of(drive), out)
 
@@ -155,9 +159,12 @@ def test_what_is_interrupted_while_it_is_put_in_place_is_known(
     assert Manifest.read(out).teacher["method"] == "dror"
 
 
-def test_where_nothing_is_known_or_scans_are_in_no_file_nothing_is_written(drive, tmp_path) -> None:
+def test_where_nothing_is_known_or_scans_are_in_no_file_no_labels_are_written(
+    drive, tmp_path
+) -> None:
     with pytest.raises(InputError, match="is sure of no point"):
-        teach(Between(Dimmer(sure_within=0.0)), of(drive), tmp_path / "out")
+        teach(Between(Dimmer(sure_within=0.0)), of(drive), tmp_path / "unsure")
+    assert {*contents(tmp_path / "unsure")} == {TAUGHT_MANIFEST}
     in_memory = Frames.of_scans([Scan.of(scene(9), name="mine")] * 3)
     with pytest.raises(InputError, match="is not in a file"):
         teach(Between(), in_memory, tmp_path / "out")
