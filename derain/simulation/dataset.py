@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from derain.errors import InputError
-from derain.files.atomic import remove_abandoned, temporary_folder, writing
+from derain.files.atomic import temporary_folder, writing
 from derain.jobs.job import FOLDER, Job, differences
 from derain.jobs.running import IsThere, Submits, Task, Value, ValueWork, values
 from derain.jobs.shard import Shard
@@ -54,7 +54,6 @@ def simulate_track(
     """
     campaign = campaign.resolved()  # reports a wrong file first
     description = campaign.description
-    _make(root)
     there = _begun(root, description)
     if "files" in there and all((root / SEQUENCES / name).is_dir() for name in campaign.names):
         return True
@@ -120,21 +119,16 @@ def _checksums(folder: Path, root: Path) -> dict[str, str]:
     }
 
 
-def _make(root: Path) -> None:
-    """Makes the folder, and removes what killed processes left in it."""
+def _begun(root: Path, description: Mapping[str, Any]) -> dict[str, Any]:
+    """The manifest of a folder that holds part of this data set; empty for a new or empty one.
+
+    Raises:
+        InputError: The folder holds something else, or cannot be made.
+    """
     if root.exists() and not root.is_dir():
         raise InputError(root, "is not a folder", "Name a new or empty folder.")
     with writing(root):
         root.mkdir(parents=True, exist_ok=True)
-    remove_abandoned(root)
-
-
-def _begun(root: Path, description: Mapping[str, Any]) -> dict[str, Any]:
-    """The manifest of a folder that holds part of this data set; empty if it holds nothing.
-
-    Raises:
-        InputError: The folder holds something else.
-    """
     # Looked for before the manifest is read, which another run may be about to write.
     others = any(not file.name.startswith(FOLDER) for file in root.iterdir())
     there = read_manifest(root)
