@@ -1,11 +1,11 @@
 """Describes a simulated track as a scene, as a person would who annotates it with patience."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from derain.annotation.scene import Box, Polygon, Rectangle, Scene
+from derain.annotation.scene import Box, Polygon, Scene
 from derain.annotation.steps import Plane
 from derain.scan import Bools, Floats
 from derain.simulation.classes import TrackClass
@@ -26,6 +26,26 @@ BOX_MARGIN = 3.0
 
 # Accuracy of a rectangle's heading, degrees; at 100 m it makes 2 mm.
 FINEST_HEADING = 1e-3
+
+
+@dataclass(frozen=True)
+class Rectangle:
+    """A rectangle seen from above.
+
+    Attributes:
+        centre: Its centre x, y, metres.
+        size: Its length along the heading and its width across, metres.
+        heading: Degrees from x towards y.
+    """
+
+    centre: tuple[float, float]
+    size: tuple[float, float]
+    heading: float
+
+    def corners(self) -> Floats:
+        """Its corners x, y in order, float64 (4, 2), metres."""
+        halves = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) / 2
+        return (halves * self.size) @ _axes(self.heading).T + self.centre
 
 
 def scene_of_track(track: Track, sensor: Sensor, beside: float = 0.0) -> Scene:

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benchmarks.track_scene import rectangle_around, scene_of_track
-from derain.annotation.scene import Rectangle, Scene, inside
+from benchmarks.track_scene import Rectangle, rectangle_around, scene_of_track
+from derain.annotation.scene import Scene, inside
 from derain.annotation.steps import annotate, road_plane
 from derain.fusion import UNKNOWN
 from derain.simulation import objects

@@ -70,7 +70,7 @@ def _draw_scene(axes: Axes, scene: Scene) -> None:
     if scene.rain_area is not None:
         _outline(axes, scene.rain_area, CLASS_COLOURS[TrackClass.RAIN], 0.8)
     for box in scene.boxes.values():
-        _outline(axes, box.footprint.corners(), CLASS_COLOURS[box.kind], 0.6)
+        _outline(axes, box.corners(), CLASS_COLOURS[box.kind], 0.6)
     road = np.array(scene.rain_area or scene.road)
     (left, bottom), (right, top) = road.min(axis=0), road.max(axis=0)
     axes.set_xlim(left - SURROUNDINGS, right + SURROUNDINGS)

@@ -36,28 +36,6 @@ CLASS_BY_NAME = {kind.name.lower(): kind for kind in TrackClass}
 
 
 @dataclass(frozen=True)
-class Rectangle:
-    """A rectangle seen from above.
-
-    Attributes:
-        centre: Its centre x, y, metres.
-        size: Its length along the heading and its width across, metres.
-        heading: Degrees from x towards y.
-    """
-
-    centre: tuple[float, float]
-    size: tuple[float, float]
-    heading: float
-
-    def corners(self) -> Floats:
-        """Its corners x, y in order, float64 (4, 2), metres."""
-        halves = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) / 2
-        cosine, sine = np.cos(np.radians(self.heading)), np.sin(np.radians(self.heading))
-        ahead_and_left = np.array([[cosine, sine], [-sine, cosine]])
-        return (halves * self.size) @ ahead_and_left + self.centre
-
-
-@dataclass(frozen=True)
 class Box:
     """An upright box, whose points are all of one class.
 
@@ -73,10 +51,12 @@ class Box:
     size: Triple
     heading: float = 0.0
 
-    @property
-    def footprint(self) -> Rectangle:
-        """Its outline seen from above."""
-        return Rectangle(self.centre[:2], self.size[:2], self.heading)
+    def corners(self) -> Floats:
+        """Its corners x, y as seen from above, in order, float64 (4, 2), metres."""
+        halves = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) / 2
+        cosine, sine = np.cos(np.radians(self.heading)), np.sin(np.radians(self.heading))
+        ahead_and_left = np.array([[cosine, sine], [-sine, cosine]])
+        return (halves * self.size[:2]) @ ahead_and_left + self.centre[:2]
 
     def contains(self, points: Floats) -> Bools:
         """True for points that lie in the box; one exactly on a side may count as in it or not.
@@ -88,7 +68,7 @@ class Box:
             bool (N,).
         """
         level = np.abs(points[:, 2] - self.centre[2]) <= self.size[2] / 2
-        return np.asarray(level & inside(self.footprint.corners(), points))
+        return np.asarray(level & inside(self.corners(), points))
 
     def corrected(self, shift: Triple = (0.0, 0.0, 0.0), **others: Any) -> "Box":
         """The box with a correction applied.

@@ -175,7 +175,7 @@ def _boxed(points: Floats, scene: Scene) -> Ints:
     kind = np.full(len(points), NO_BOX, dtype=np.int64)
     by_rank = sorted(scene.boxes.values(), key=lambda box: box.kind is not TrackClass.SPRINKLER)
     for box in reversed(by_rank):  # later boxes overwrite earlier ones
-        x = box.footprint.corners()[:, 0]
+        x = box.corners()[:, 0]
         span = x.min() - CORNER_TOLERANCE, x.max() + CORNER_TOLERANCE
         first, last = np.searchsorted(points[:, 0], span)
         kind[first:last][box.contains(points[first:last])] = box.kind

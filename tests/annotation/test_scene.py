@@ -1,4 +1,4 @@
-"""Scenes: rectangles and boxes, their corrections, polygons, and the file that describes them."""
+"""Scenes: boxes, their corrections, polygons, and the file that describes them."""
 
 from pathlib import Path
 
@@ -8,37 +8,36 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from derain.annotation import scene as module
-from derain.annotation.scene import (
-    Box,
-    Rectangle,
-    Scene,
-    read_scene,
-)
+from derain.annotation.scene import Box, Scene, read_scene
 from derain.errors import InputError
 from derain.simulation.classes import TrackClass
 
 lengths = st.floats(0.1, 50)
 places = st.floats(-100, 100)
-rectangles = st.builds(
-    Rectangle, st.tuples(places, places), st.tuples(lengths, lengths), st.floats(-180, 180)
+boxes = st.builds(
+    Box,
+    st.just(TrackClass.CAR),
+    st.tuples(places, places, places),
+    st.tuples(lengths, lengths, lengths),
+    st.floats(-180, 180),
 )
 
 
-@given(rectangles, st.integers(0, 2**32 - 1))
-def test_a_point_is_inside_where_combining_the_sides_leads_to_it(rectangle, seed) -> None:
+@given(boxes, st.integers(0, 2**32 - 1))
+def test_a_point_is_inside_where_combining_the_sides_leads_to_it(box, seed) -> None:
     shares = np.random.default_rng(seed).uniform(-1, 1, (50, 2))
     shares = shares[np.abs(np.abs(shares) - 0.5).min(axis=1) > 1e-6]
-    first, second, _, fourth = rectangle.corners()
+    first, second, _, fourth = box.corners()
     along, across = first - second, first - fourth
-    points = rectangle.centre + shares[:, :1] * along + shares[:, 1:] * across
-    box = Box(TrackClass.CAR, (*rectangle.centre, 0), (*rectangle.size, 1), rectangle.heading)
-    points = np.column_stack([points, np.zeros(len(points))])
+    x, y, z = box.centre
+    points = (x, y) + shares[:, :1] * along + shares[:, 1:] * across
+    points = np.column_stack([points, np.full(len(points), z)])
     assert np.array_equal(box.contains(points), (np.abs(shares) < 0.5).all(axis=1))
 
 
 def test_the_length_runs_along_the_heading() -> None:
-    rectangle = Rectangle((10, 0), (4, 2), 90)
-    corners = {(round(x, 9), round(y, 9)) for x, y in rectangle.corners()}
+    box = Box(TrackClass.CAR, (10, 0, 0), (4, 2, 1), 90)
+    corners = {(round(x, 9), round(y, 9)) for x, y in box.corners()}
     assert corners == {(11, 2), (11, -2), (9, 2), (9, -2)}
 
 
