@@ -56,7 +56,7 @@ class Box:
         halves = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) / 2
         cosine, sine = np.cos(np.radians(self.heading)), np.sin(np.radians(self.heading))
         ahead_and_left = np.array([[cosine, sine], [-sine, cosine]])
-        return (halves * self.size[:2]) @ ahead_and_left + self.centre[:2]
+        return np.asarray((halves * self.size[:2]) @ ahead_and_left + self.centre[:2])
 
     def contains(self, points: Floats) -> Bools:
         """True for points that lie in the box; one exactly on a side may count as in it or not.
