@@ -119,7 +119,11 @@ def readers() -> list[Reader]:
             MANIFEST,
             _read_manifest,
             lambda: [as_json(manifest)],
-            [lambda: b"[" * 100_000, lambda: b'{"made_by": ' + b"9" * 5000],
+            [
+                lambda: b"[" * 100_000,
+                lambda: b'{"made_by": ' + b"9" * 5000,
+                lambda: as_json({**manifest, "files": [*files]}),
+            ],
             lambda generator: as_json(changed(manifest, generator)),
         ),
         Reader("times", "metadata.csv", _read_times, lambda: [TIMES.encode()]),

@@ -5,7 +5,7 @@ and with ``files`` when every sequence is complete.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +47,7 @@ def read_manifest(root: Path) -> dict[str, Any]:
     if not isinstance(content, dict) or content.get("made_by") != MAKER:
         return {}
     values = document.members()
-    parsers = {
+    parsers: dict[str, Callable[[Entry], object]] = {
         SPLIT: lambda parts: parts.record(dict.fromkeys(SPLIT_PARTS, Entry.texts), SPLIT_PARTS),
         RAIN_RATE: rates_of_sequences,
         FILES: lambda files: files.each(Entry.text),
