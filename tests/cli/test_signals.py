@@ -24,7 +24,9 @@ def write(arguments):
     with replacing(Path(sys.argv[1])) as temporary:
         temporary.write_bytes(b"half")
         print("writing", flush=True)
-        time.sleep(60)
+        # A signal that comes right before a sleep is handled when the sleep ends.
+        while True:
+            time.sleep(0.01)
 
 info.main = write
 # Tests that run in the background, or by nohup, ignore what a terminal would send.

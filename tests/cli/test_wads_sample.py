@@ -9,7 +9,7 @@ from derain.scan import class_ids
 FALLING_SNOW = 110
 
 
-@pytest.mark.usefixtures("short_proof")
+@pytest.mark.usefixtures("one_block", "short_proof")
 def test_the_scores_are_the_published_ones(succeed, shared, here) -> None:
     weights, sample = shared / "oracles/outdet_wads.pt", shared / "data/wads/sample.bin"
     succeed("import-weights", "outdet", weights, "--stats", "wads", "--out", "w.ckpt")

@@ -16,7 +16,6 @@ from derain.scan import class_ids
 
 if TYPE_CHECKING:
     from derain.models.outdet import OutDet
-    from derain.models.salsanext import SalsaNextModule
 
 KEPT = Path(__file__).resolve().parents[1] / "export" / "kept"
 
@@ -75,11 +74,10 @@ def prepare(folder: Path, simulated: Path) -> None:
     _put_troubles(folder)
 
 
-def put_networks(folder: Path, outdet: "OutDet", salsanext: "SalsaNextModule") -> None:
-    """Puts weights into a folder as the authors of 3D-OutDet publish theirs, and a SalsaNext."""
+def put_weights(folder: Path, outdet: "OutDet") -> None:
+    """Puts weights into a folder as the authors of 3D-OutDet publish theirs."""
     import torch
 
-    from derain.models.checkpoint import save_model
     from derain.models.outdet import PUBLISHED_KEYS
 
     tensors = outdet.network.state_dict()
@@ -87,7 +85,6 @@ def put_networks(folder: Path, outdet: "OutDet", salsanext: "SalsaNextModule") -
     for name in ("saved_models/bin_desnow_wads/outdet.pt", "rehearse3d_outdet.pt"):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         torch.save(published, folder / name)
-    save_model(salsanext, folder / "salsanext.ckpt")
 
 
 def _scans(simulated: Path) -> list[Path]:

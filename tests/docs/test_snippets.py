@@ -17,7 +17,7 @@ import derain
 from derain.cli import main as command_line
 
 from .pages import PAGES, REPOSITORY, Snippet, snippets
-from .prepared import prepare, put_networks, write_drive
+from .prepared import prepare, put_weights, write_drive
 from .running import run
 
 SHELL = ("bash", "console")
@@ -46,12 +46,10 @@ def name_of(page: Path) -> str:
 
 
 @pytest.fixture
-def page_folder(
-    tmp_path, made_once, random_outdet, random_salsanext, monkeypatch
-) -> Iterator[Path]:
+def page_folder(tmp_path, made_once, random_outdet, monkeypatch) -> Iterator[Path]:
     """The folder that a page is run in, in a process which proves and times little."""
     prepare(tmp_path, made_once("documented_drive", write_drive))
-    put_networks(tmp_path, random_outdet, random_salsanext)
+    put_weights(tmp_path, random_outdet)
     monkeypatch.chdir(tmp_path)
     # The page of troubles shows what is printed where this runtime is missing.
     monkeypatch.setitem(sys.modules, "openvino", None)

@@ -54,7 +54,7 @@ def data(root) -> list[str]:
 @pytest.fixture(scope="module")
 def checkpoint(toy_network, root, data) -> Path:
     """What ``derain fit`` makes of it."""
-    assert main(["fit", *data, "--trainer.max_epochs", "20"]) == 0
+    assert main(["fit", *data, "--trainer.max_epochs", "8"]) == 0
     (best,) = root.glob("runs/**/best.ckpt")
     return best
 
