@@ -65,7 +65,7 @@ class Bench:
             *(str(DERAIN), name, "--config", f"{self.network}_wads36.yaml"),
             *("--data.root", str(self.root.resolve()), "--data.test", f'["{SCANS}"]'),
             *("--trainer.accelerator", "cpu", "--trainer.enable_progress_bar", "false"),
-            *("--panels.scans", "0", "--errors.pictures", "0"),
+            *("--panels.scans", "0"),
             *("--trainer.logger.name", run, *options),
         ]
 

@@ -34,7 +34,7 @@ from derain.files.atomic import replacing
 from derain.files.documents import Entry
 from derain.models.base import DerainingModule
 from derain.models.callbacks.best_checkpoint import BestCheckpoint
-from derain.models.callbacks.panels import Dashboard, ErrorPanels, ScanPanels
+from derain.models.callbacks.panels import Dashboard, Panels
 from derain.models.callbacks.prediction import PredictionWriter
 from derain.models.callbacks.report import TestReport
 from derain.models.callbacks.step_times import StepTimes
@@ -79,8 +79,6 @@ LEAST = {
     "trainer.check_val_every_n_epoch": 1,
     "trainer.log_every_n_steps": 0,
     "panels.scans": 0,
-    "panels.pictures": 0,
-    "errors.pictures": 0,
     "scan_check.scans": 0,
 }
 
@@ -130,8 +128,7 @@ class DerainCLI(LightningCLI):
         parser.add_lightning_class_args(BestCheckpoint, "checkpoint")
         parser.add_lightning_class_args(ModelCheckpoint, "last")
         parser.add_lightning_class_args(LearningRateMonitor, "learning_rate")
-        parser.add_lightning_class_args(ScanPanels, "panels")
-        parser.add_lightning_class_args(ErrorPanels, "errors")
+        parser.add_lightning_class_args(Panels, "panels")
         parser.add_lightning_class_args(StepTimes, "step_times")
         parser.add_lightning_class_args(Dashboard, "dashboard")
         parser.add_lightning_class_args(PredictionWriter, "predictions")

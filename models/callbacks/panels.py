@@ -5,7 +5,6 @@ from typing import Any
 import lightning
 import numpy as np
 from lightning.pytorch.loggers import TensorBoardLogger
-from lightning.pytorch.trainer.states import TrainerFn
 
 from derain.evaluation.counts import RainCounts, band_names
 from derain.evaluation.operating_points import CURVE_THRESHOLDS, OperatingPoints
@@ -14,7 +13,7 @@ from derain.models.base import DerainingModule
 from derain.models.callbacks.step_times import SPEED, STEP
 from derain.pictures.error_pictures import errors_figure, operating_points_figure
 from derain.pictures.scan_pictures import comparison_figure
-from derain.scan import Floats, Ints
+from derain.scan import Bools, Floats, Ints, Scan
 
 # Groups of scalars.
 BY_CLASS, LEFT_BY_RANGE, LOST_BY_RANGE = "errors_by_class", "rain_left_by_range", "lost_by_range"
@@ -43,62 +42,34 @@ CHARTS = {
 }
 
 
-class DrawnEpochs:
-    """Chooses some of the epochs that end in a validation, spread from the first to the last.
+class Panels(lightning.Callback):
+    """Logs what is judged wrongly, of every validation as numbers, of some as pictures.
 
-    Where the number of epochs is not known, each chosen one comes after twice as many
-    validations as the one before it. Of an epoch with several validations, the first is drawn.
+    As numbers: the share of each class that is judged wrongly, and by range the share of the rain
+    that is left and of all else that is lost. As pictures: input, truth and prediction of the first
+    rainy validation scans; and, also of the test, a table by class and range, and the
+    precision-recall curve with the chosen threshold, which TensorBoard's own panel of such curves
+    gets, too.
 
-    Args:
-        pictures: Number of epochs that are drawn in a training whose length is known.
-    """
-
-    def __init__(self, pictures: int) -> None:
-        self.pictures = pictures
-        self.last: int | None = None
-
-    def begins(self, trainer: lightning.Trainer) -> bool:
-        """True if what is measured now is drawn; called once, when a validation or test begins."""
-        if trainer.sanity_checking or not self.pictures:
-            return False
-        if trainer.state.fn != TrainerFn.FITTING:
-            return True
-        if trainer.current_epoch == self.last or not self._chosen(trainer):
-            return False
-        self.last = trainer.current_epoch
-        return True
-
-    def _chosen(self, trainer: lightning.Trainer) -> bool:
-        epochs = trainer.max_epochs
-        every = trainer.check_val_every_n_epoch or 1
-        validation = (trainer.current_epoch + 1) // every
-        if epochs is None or epochs < 1:
-            return validation & (validation - 1) == 0  # a power of two
-        return validation - 1 in np.linspace(0, epochs // every - 1, self.pictures).round()
-
-
-class ScanPanels(lightning.Callback):
-    """Logs input, truth and prediction of the first rainy validation scans.
-
-    Of several processes the first draws, of the scans that it measures.
-
-    A picture costs as much as a step of training and more, and of each scan TensorBoard shows ten
-    pictures. So ten of the epochs are drawn, chosen by :class:`DrawnEpochs`.
+    A picture costs as much as a step of training and more. So validations 1, 2, 4, 8 and so on are
+    drawn, and the last one. Of several processes the first draws, of the scans that it measures.
 
     Args:
-        scans: Number of scans to show; 0 shows none.
-        pictures: Number of pictures of each to draw in a training.
+        scans: Number of scans to show; 0 draws no picture at all.
     """
 
-    def __init__(self, scans: int = 2, pictures: int = 10) -> None:
+    def __init__(self, scans: int = 2) -> None:
         self.scans = scans
-        self.epochs = DrawnEpochs(pictures)
-        self.left = 0
+        self.validations = 0
+        # The scans to show, what is called rain in each, and its rain.
+        self.shown: list[tuple[Scan, Bools, Bools]] = []
+        self.undrawn: int | None = None  # step of the last validation, where it was not drawn
 
     def on_validation_epoch_start(self, trainer: lightning.Trainer, *_: Any) -> None:
-        """Restarts counting; the order of validation scans is fixed."""
-        draws = self.epochs.begins(trainer) and trainer.is_global_zero
-        self.left = self.scans if draws else 0
+        """Begins with the first scan again; the order of validation scans is fixed."""
+        self.shown = []
+        if not trainer.sanity_checking:
+            self.validations += 1
 
     def on_validation_batch_end(
         self,
@@ -108,88 +79,71 @@ class ScanPanels(lightning.Callback):
         batch: Batch,
         *_: Any,
     ) -> None:
-        """Draws the batch's rainy scans while there are panels left to fill."""
-        if not self.left or not isinstance(trainer.logger, TensorBoardLogger):
-            return
+        """Keeps the first rainy scans, to be drawn."""
         for measured, probability in zip(batch.measured, outputs, strict=True):
+            if len(self.shown) == self.scans:
+                return
             scan = measured.scan
-            if not self.left or scan.label is None:
+            if scan.label is None:
                 continue
             rain = model.card.rain_of(scan)
-            if not rain.any():
-                continue
-            called = {"prediction": probability > model.spec.threshold}
-            figure = comparison_figure(scan, called, rain, scan.name)
-            name = f"validation scan {self.scans - self.left}"
-            trainer.logger.experiment.add_figure(name, figure, trainer.global_step)
-            self.left -= 1
-
-
-class ErrorPanels(lightning.Callback):
-    """Logs what is judged wrongly, of every validation as numbers, of some epochs as pictures.
-
-    As numbers: the share of each class that is judged wrongly, and by range the share of the rain
-    that is left and of all else that is lost. As pictures, and of the test: a table by class and
-    range, and the precision-recall curve with the chosen threshold, which TensorBoard's own panel
-    of such curves gets, too.
-
-    Args:
-        pictures: Of how many epochs to draw pictures in a training, chosen by
-            :class:`DrawnEpochs`, besides the last validation; 0 draws none.
-    """
-
-    def __init__(self, pictures: int = 10) -> None:
-        self.epochs = DrawnEpochs(pictures)
-        self.draws = False
-        self.undrawn: int | None = None  # step of the last validation, where it was not drawn
-
-    def on_validation_epoch_start(self, trainer: lightning.Trainer, *_: Any) -> None:
-        """Chooses whether this validation is drawn."""
-        self.draws = self.epochs.begins(trainer)
+            if rain.any():
+                self.shown.append((scan, probability > model.spec.threshold, rain))
 
     def on_validation_epoch_end(self, trainer: lightning.Trainer, model: DerainingModule) -> None:
-        """Logs the errors of a validation."""
+        """Logs the errors of a validation, and draws it if its number is a power of two."""
         if trainer.sanity_checking or not model.metrics.counts().per_scan:
             return
         values = errors_by_name(model.metrics.counts())  # of all processes
         for logger in trainer.loggers:
             logger.log_metrics(values, trainer.global_step)
-        if self.draws:
-            self._draw(trainer, model, "validation", trainer.global_step)
-        self.undrawn = None if self.draws else trainer.global_step
+        self.undrawn = trainer.global_step
+        if self.validations & (self.validations - 1) == 0:
+            self._draw_validation(trainer, model)
 
     def on_train_end(self, trainer: lightning.Trainer, model: DerainingModule) -> None:
         """Draws the last validation, whenever that was; its counts are still there."""
-        if self.undrawn is not None and self.epochs.pictures:
-            self._draw(trainer, model, "validation", self.undrawn)
-        self.undrawn = None
+        self._draw_validation(trainer, model)
 
     def on_test_epoch_end(self, trainer: lightning.Trainer, model: DerainingModule) -> None:
         """Draws the errors of a test."""
-        if self.epochs.pictures and model.metrics.counts().per_scan:
-            self._draw(trainer, model, "test", model.trained_steps or trainer.global_step)
+        if self.scans and model.metrics.counts().per_scan:
+            _draw_errors(trainer, model, "test", model.trained_steps or trainer.global_step)
 
-    def _draw(
-        self, trainer: lightning.Trainer, model: DerainingModule, part: str, step: int
-    ) -> None:
-        # All processes put the counts together, the first one draws.
-        points, measured = model.threshold_counts.points(), model.metrics.counts()
-        if not any(counts.points for counts in measured.by_class.values()):
-            return  # as of scans that hold no point, or none whose class is known
-        table = measured.by_class_and_range()
-        title = f"{part} on {model.card.name}, step {step:,}"
-        for logger in trainer.loggers:
-            if not isinstance(logger, TensorBoardLogger) or not trainer.is_global_zero:
-                continue
-            writer = logger.experiment
-            figure = errors_figure(table, band_names(), title)
-            writer.add_figure(f"{part}: errors by class and range", figure, step)
-            if points.rain:
-                figure = operating_points_figure(points, model.spec.threshold, title)
-                writer.add_figure(f"{part}: threshold", figure, step)
-                writer.add_pr_curve_raw(
-                    f"{part}: rain", *_of_curve(points), step, len(CURVE_THRESHOLDS)
-                )
+    def _draw_validation(self, trainer: lightning.Trainer, model: DerainingModule) -> None:
+        """Draws the last validation, unless it is drawn already."""
+        if not self.scans or self.undrawn is None:
+            return
+        _draw_errors(trainer, model, "validation", self.undrawn)
+        for writer in _writers(trainer):
+            for number, (scan, called_rain, rain) in enumerate(self.shown):
+                called = {"prediction": called_rain}
+                figure = comparison_figure(scan, called, rain, scan.name)
+                writer.add_figure(f"validation scan {number}", figure, self.undrawn)
+        self.undrawn = None
+
+
+def _draw_errors(trainer: lightning.Trainer, model: DerainingModule, part: str, step: int) -> None:
+    # All processes put the counts together, the first one draws.
+    points, measured = model.threshold_counts.points(), model.metrics.counts()
+    if not any(counts.points for counts in measured.by_class.values()):
+        return  # as of scans that hold no point, or none whose class is known
+    table = measured.by_class_and_range()
+    title = f"{part} on {model.card.name}, step {step:,}"
+    for writer in _writers(trainer):
+        figure = errors_figure(table, band_names(), title)
+        writer.add_figure(f"{part}: errors by class and range", figure, step)
+        if points.rain:
+            figure = operating_points_figure(points, model.spec.threshold, title)
+            writer.add_figure(f"{part}: threshold", figure, step)
+            curve = _of_curve(points)
+            writer.add_pr_curve_raw(f"{part}: rain", *curve, step, len(CURVE_THRESHOLDS))
+
+
+def _writers(trainer: lightning.Trainer) -> list[Any]:
+    """TensorBoard's writers of the process that draws; in the others none."""
+    loggers = trainer.loggers if trainer.is_global_zero else []
+    return [logger.experiment for logger in loggers if isinstance(logger, TensorBoardLogger)]
 
 
 def errors_by_name(measured: RainCounts) -> dict[str, float]:
@@ -219,11 +173,10 @@ class Dashboard(lightning.Callback):
 
     def on_train_start(self, trainer: lightning.Trainer, *_: Any) -> None:
         """Writes the layout, which TensorBoard keeps with the run."""
-        for logger in trainer.loggers:
-            if isinstance(logger, TensorBoardLogger):
-                logger.experiment.add_custom_scalars(
-                    {
-                        question: {title: ["Multiline", tags] for title, tags in charts.items()}
-                        for question, charts in CHARTS.items()
-                    }
-                )
+        for writer in _writers(trainer):
+            writer.add_custom_scalars(
+                {
+                    question: {title: ["Multiline", tags] for title, tags in charts.items()}
+                    for question, charts in CHARTS.items()
+                }
+            )

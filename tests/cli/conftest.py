@@ -38,7 +38,7 @@ def wads(tmp_path) -> list[str]:
     return [
         *("--config", "outdet_wads.yaml", "--data.root", str(root), "--data.split", split),
         *("--data.loading.workers", "0", "--trainer.enable_progress_bar", "false"),
-        *("--panels.scans", "0", "--errors.pictures", "0"),
+        *("--panels.scans", "0"),
     ]
 
 

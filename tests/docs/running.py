@@ -12,7 +12,7 @@ from derain.cli.main import TRAINING, main
 
 # What the test adds to every training of a page: it shows no progress and draws nothing.
 QUIETLY = ("--trainer.accelerator", "cpu", "--trainer.enable_progress_bar", "false")
-NOTHING_DRAWN = ("--panels.scans", "0", "--errors.pictures", "0")
+NOTHING_DRAWN = ("--panels.scans", "0")
 TIMED_ONCE = ("--scan", "scan.bin", "--repeats", "1")
 
 COMMAND = "import sys; from derain.cli.main import main; sys.exit(main(sys.argv[1:]))"

@@ -19,7 +19,7 @@ from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.learning.task import agree_on_task
 from derain.models.base import DerainingModule
-from derain.models.callbacks.panels import ScanPanels
+from derain.models.callbacks.panels import Panels
 from derain.models.callbacks.report import TestReport
 from derain.models.lisnownet import LiSnowNet
 from derain.models.outdet import OutDet
@@ -169,7 +169,7 @@ def test_callbacks_go_without_a_data_module(make_trainer, memory, capsys, tmp_pa
     loaders = {
         part: scan_loader(memory.source(part), part, task) for part in ("train", "validation")
     }
-    callbacks = [ScanCheck(), ScanPanels(), TestReport()]
+    callbacks = [ScanCheck(), Panels(), TestReport()]
     make_trainer(1, callbacks=callbacks).fit(model, *loaders.values())
     test = scan_loader(memory.source("test"), "test", task)
     make_trainer(1, callbacks=callbacks, default_root_dir=tmp_path).test(model, test, verbose=False)

@@ -23,7 +23,7 @@ WriteScan = Callable[..., None]
 # A step of training and one of validation.
 ONE_STEP = [
     *("--trainer.max_epochs", "1", "--trainer.limit_train_batches", "1"),
-    *("--trainer.enable_progress_bar", "false", "--panels.scans", "0", "--errors.pictures", "0"),
+    *("--trainer.enable_progress_bar", "false", "--panels.scans", "0"),
 ]
 # Trained below, or in tests of their own.
 TRAINED = {

@@ -27,7 +27,7 @@ FIT = ("fit", "--config", "outdet_simulated.yaml")
         ("--data.loading.batch_size", "0", "batch_size"),
         ("--seed_everything", "-1", "--seed_everything: "),
         ("--trainer.strategy", "foo", "strategy"),
-        ("--panels.pictures", "-1", "--panels.pictures: "),
+        ("--panels.scans", "-1", "--panels.scans: "),
         ("--trainer.accumulate_grad_batches", "0", "--trainer.accumulate_grad_batches: "),
         ("--trainer.check_val_every_n_epoch", "0", "--trainer.check_val_every_n_epoch: "),
         ("--scan_check.scans", "-1", "--scan_check.scans: "),

@@ -13,7 +13,7 @@ from derain.simulation.manifest import MAKER, MANIFEST
 
 QUICK = [
     *("--trainer.enable_progress_bar", "false", "--trainer.max_epochs", "1"),
-    *("--panels.scans", "0", "--errors.pictures", "0", "--data.scans_per_epoch", "3"),
+    *("--panels.scans", "0", "--data.scans_per_epoch", "3"),
 ]
 
 

@@ -135,7 +135,7 @@ def test_a_test_is_logged_into_the_folder_of_its_training(succeed, wads, caplog)
     run = Path("runs/outdet_wads/version_0")
     best = run / "checkpoints/best.ckpt"
     kept = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
-    outcome = succeed("test", *wads, "--errors.pictures", "1", "--ckpt_path", best)
+    outcome = succeed("test", *wads, "--panels.scans", "1", "--ckpt_path", best)
     assert [path.name for path in run.parent.iterdir()] == ["version_0"]
     assert all(path.read_bytes() == content for path, content in kept.items())
     assert f"Written to {run.resolve()}/test.json" in outcome.out

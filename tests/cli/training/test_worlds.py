@@ -18,7 +18,7 @@ def test_worlds_are_made_and_trained_on(succeed, small_world) -> None:
     options = [
         *("--data.scans_per_epoch", 8, "--data.loading.workers", 0),
         *("--trainer.max_epochs", 1, "--trainer.check_val_every_n_epoch", 1),
-        *("--trainer.enable_progress_bar", "false", "--panels.scans", 0, "--errors.pictures", 0),
+        *("--trainer.enable_progress_bar", "false", "--panels.scans", 0),
     ]
     succeed("fit", "--config", "worlds.yaml", *options)
     (checkpoint,) = Path("runs/cues_worlds").rglob("last.ckpt")

@@ -8,7 +8,6 @@ import lightning
 import numpy as np
 import pytest
 from lightning.pytorch.loggers import TensorBoardLogger
-from lightning.pytorch.trainer.states import TrainerFn
 from matplotlib.figure import Figure
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from tensorboard.util import tensor_util
@@ -20,7 +19,7 @@ from derain.evaluation.hard_cases import scene
 from derain.evaluation.operating_points import CURVE_THRESHOLDS
 from derain.files.labels import write_labels
 from derain.models.callbacks import panels
-from derain.models.callbacks.panels import CHARTS, Dashboard, DrawnEpochs, ErrorPanels, ScanPanels
+from derain.models.callbacks.panels import CHARTS, Dashboard, Panels
 from derain.models.outdet import OutDet
 from derain.pictures.error_pictures import errors_figure
 from derain.scan import Bools, Scan
@@ -29,54 +28,6 @@ SNOW = 110
 RAINY = (1, 2, 4, 5)  # of six scans
 EPOCHS = 2
 TABLE, CURVE = "errors by class and range", "threshold"
-
-
-def drawn_of(
-    trainer: lightning.Trainer, chosen: DrawnEpochs, last: int, step: int, validations: int = 1
-) -> list[int]:
-    trainer.state.fn = TrainerFn.FITTING
-    drawn = []
-    for epoch in range(step - 1, last, step):
-        trainer.fit_loop.epoch_progress.current.completed = epoch
-        drawn += [epoch for _ in range(validations) if chosen.begins(trainer)]
-    return drawn
-
-
-@pytest.mark.parametrize(
-    ("epochs", "every", "pictures", "drawn"),
-    [
-        (3, 1, 10, [0, 1, 2]),
-        (60, 1, 4, [0, 20, 39, 59]),
-        (60, 10, 10, [9, 19, 29, 39, 49, 59]),
-        (60, 10, 2, [9, 59]),
-        (60, None, 2, [0, 59]),
-        (5, 1, 1, [0]),
-        (5, 1, 0, []),
-        (-1, 1, 2, [0, 1, 3, 7, 15, 31, 63]),
-        (-1, 10, 2, [9, 19, 39]),
-    ],
-    ids=str,
-)
-def test_the_epochs_that_are_drawn_are_spread_over_the_training(
-    make_trainer, epochs, every, pictures, drawn
-) -> None:
-    trainer = make_trainer(epochs)
-    trainer.check_val_every_n_epoch = every
-    last = epochs if epochs > 0 else 70
-    assert drawn_of(trainer, DrawnEpochs(pictures), last, every or 1) == drawn
-
-
-def test_of_several_validations_in_an_epoch_one_is_drawn(make_trainer) -> None:
-    assert drawn_of(make_trainer(3), DrawnEpochs(10), 3, 1, validations=50) == [0, 1, 2]
-
-
-def test_a_test_is_drawn_and_a_sanity_check_is_not(make_trainer) -> None:
-    trainer = make_trainer(3)
-    trainer.state.fn = TrainerFn.TESTING
-    assert DrawnEpochs(1).begins(trainer)
-    assert not DrawnEpochs(0).begins(trainer)
-    trainer.sanity_checking = True
-    assert not DrawnEpochs(1).begins(trainer)
 
 
 @pytest.fixture
@@ -118,7 +69,7 @@ def test_the_first_rainy_scans_are_drawn_after_every_epoch(
                 judged.append([rain > model.spec.threshold for rain in outputs])
 
     log = TensorBoardLogger(tmp_path, "log", "")
-    callbacks = [ScanPanels(scans), Judged()]
+    callbacks = [Panels(scans), Judged()]
     make_trainer(EPOCHS, callbacks=callbacks, logger=log).fit(OutDet(), rainy)
 
     assert [Path(scan.name).name for scan, *_ in drawn] == [
@@ -136,13 +87,14 @@ def test_the_first_rainy_scans_are_drawn_after_every_epoch(
 
     events = EventAccumulator(str(tmp_path / "log"), {"images": 0}).Reload()
     names = [f"validation scan {number}" for number in range(len(expected))]
-    assert sorted(events.Tags()["images"]) == names
+    images = events.Tags()["images"]
+    assert sorted(tag for tag in images if tag.startswith("validation scan ")) == names
     for name in names:
         assert [event.step for event in events.Images(name)] == [1, 2]  # one batch an epoch
 
 
 def test_without_tensorboard_nothing_is_drawn(make_trainer, rainy, drawn) -> None:
-    make_trainer(1, callbacks=[ScanPanels()]).fit(OutDet(), rainy)
+    make_trainer(1, callbacks=[Panels()]).fit(OutDet(), rainy)
     assert not drawn
 
 
@@ -175,7 +127,7 @@ def train(make_trainer, data, tmp_path) -> Callable[..., Any]:
 
 
 def test_the_numbers_are_those_of_the_counts(train) -> None:
-    _, model, events = train(2, ErrorPanels())
+    _, model, events = train(2, Panels())
     last = {
         tag: events.Scalars(tag)[-1].value
         for tag in events.Tags()["scalars"]
@@ -200,7 +152,7 @@ def test_the_numbers_are_those_of_the_counts(train) -> None:
 
 
 def test_the_curve_goes_through_the_counts_at_the_threshold(train) -> None:
-    _, model, events = train(1, ErrorPanels())
+    _, model, events = train(1, Panels())
     points = model.threshold_counts.points()
     assert points.counts(points.at(model.spec.threshold)) == model.metrics.counts().pooled
     (event,) = events.Tensors("validation: rain")
@@ -218,12 +170,13 @@ def test_the_curve_goes_through_the_counts_at_the_threshold(train) -> None:
 
 
 def test_a_training_that_ends_early_is_drawn_as_it_ends(train) -> None:
-    _, _, events = train(50, ErrorPanels(2), max_steps=4)
-    assert [event.step for event in events.Images(f"validation: {TABLE}")] == [1, 4]
+    _, _, events = train(50, Panels(), max_steps=7)
+    for name in (f"validation: {TABLE}", "validation scan 0"):
+        assert [event.step for event in events.Images(name)] == [1, 2, 4, 7]
 
 
 def test_no_pictures_leave_the_numbers(train) -> None:
-    _, _, events = train(1, ErrorPanels(0))
+    _, _, events = train(1, Panels(0))
     assert not events.Tags()["images"]
     assert "errors_by_class/falling-snow" in events.Tags()["scalars"]
 
@@ -233,17 +186,17 @@ def test_scans_without_a_point_have_no_errors(make_trainer, data, tmp_path, monk
     empty = Scan.of(np.zeros((0, 4))).with_label(np.zeros(0, np.int64))
     nothing = InMemory(data.source("train"), [empty], card="wads")
     log = TensorBoardLogger(tmp_path, "", "log")
-    make_trainer(1, callbacks=[ErrorPanels()], logger=log).fit(OutDet(), nothing)
+    make_trainer(1, callbacks=[Panels()], logger=log).fit(OutDet(), nothing)
 
 
 def test_scans_without_labels_have_no_errors(make_trainer, data, tmp_path) -> None:
     log = TensorBoardLogger(tmp_path, "", "log")
-    trainer = make_trainer(1, callbacks=[ErrorPanels()], logger=log, num_sanity_val_steps=0)
+    trainer = make_trainer(1, callbacks=[Panels()], logger=log, num_sanity_val_steps=0)
     model = OutDet()
     trainer.fit(model, data)
     model.metrics.reset()
     written = len(list(tmp_path.rglob("*")))
-    ErrorPanels().on_validation_epoch_end(trainer, model)
+    Panels().on_validation_epoch_end(trainer, model)
     assert len(list(tmp_path.rglob("*"))) == written
 
 
