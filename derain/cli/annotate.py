@@ -5,7 +5,7 @@ are rain or road, by their height above the plane; everything else is background
 <stem>.label with the class ids of REHEARSE-3D (255: unknown), and a picture of the sequence.
 
   derain annotate sequences/003 --scene scene.yaml --out labels/003
-  derain annotate scans/*.bin --scene scene.yaml --out labels --sequence 003 --json
+  derain annotate scans/*.bin --scene scene.yaml --out labels --sequence 003
   derain annotate lidar --scene scene.yaml --out labels --radar radar --within 0.5
 
 A scene file, in metres and degrees in the sensor's frame (x forward, y left, z up):
@@ -29,13 +29,10 @@ transforms them into the LiDAR's frame.
 """
 
 import argparse
-import json
 import os
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from tqdm import tqdm
 
@@ -70,7 +67,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="METRES",
         help="label radar points within METRES of a LiDAR point (default: %(default)s)",
     )
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
     for option in ("--columns", "--radar-columns"):
         add_columns(parser, option)
 
@@ -113,15 +109,14 @@ def main(arguments: argparse.Namespace) -> int:
     scan = source[len(source) // 2].read()
     title = f"sequence {sequence}, {Path(scan.name).name}: {len(scan):,} points"
     save(annotation_figure(scan, annotate(scan, scene, plane), scene, title), picture)
-    report: dict[str, Any] = {
-        "sequence": sequence,
-        "scans": len(source),
-        "points": points.total(),
-        "points_by_class": {name: points[id_] for id_, name in CLASS_NAMES.items()},
-        "plane": {**asdict(plane), "slope": plane.slope},
-        "picture": str(picture),
-    }
-    print_lines(json.dumps(report) if arguments.json else _as_text(report))
+    lines = [
+        f"sequence {sequence}: {len(source):,} scans, {points.total():,} points",
+        f"road: {plane.offset:.3f} m under the sensor, inclined by {plane.slope:.2f} degrees",
+    ]
+    for id_, name in CLASS_NAMES.items():
+        share = points[id_] / max(points.total(), 1)
+        lines.append(f"  {name:<11}{points[id_]:>14,} {share:>8.2%}")
+    print_lines("\n".join([*lines, str(picture)]))
     return 0
 
 
@@ -134,14 +129,3 @@ def _radar_frames(folder: Path | None, columns: Sequence[str], source: Source) -
         reason = "no scan has its name"
         raise InputError(frames[key].name, reason, "Pair the frames in time with `derain fuse`.")
     return frames
-
-
-def _as_text(report: dict[str, Any]) -> str:
-    plane, points = report["plane"], report["points"]
-    lines = [
-        f"sequence {report['sequence']}: {report['scans']:,} scans, {points:,} points",
-        f"road: {plane['offset']:.3f} m under the sensor, inclined by {plane['slope']:.2f} degrees",
-    ]
-    for name, count in report["points_by_class"].items():
-        lines.append(f"  {name:<11}{count:>14,} {count / max(points, 1):>8.2%}")
-    return "\n".join([*lines, report["picture"]])

@@ -6,7 +6,6 @@ numbers (KITTI's format).
   derain odometry drive --out poses.txt
   derain odometry drive --out drive/poses.txt               later commands read them there
   derain odometry WADS --out poses                          poses/11.txt, poses/12.txt, ...
-  derain odometry drive --out poses.txt --json
 
 SEQUENCE is a folder of consecutive scans, or a data set, or a part of one. The residual is the
 median distance between the surfaces of a scan and of the scan before it. derain warns of a scan
@@ -16,12 +15,10 @@ the exit code is 2.
 
 import argparse
 import math
-import sys
-from functools import partial
 from pathlib import Path
 
-from derain.cli.options import add_columns, add_json, add_threads, add_topic
-from derain.cli.outputs import exit_code, print_error, print_facts, print_lines
+from derain.cli.options import add_columns, add_threads, add_topic
+from derain.cli.outputs import exit_code, print_error, print_line, print_lines
 from derain.recordings.odometry import Registration
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
@@ -47,7 +44,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="file to write; for several sequences, folder of files <sequence>.txt",
     )
     parser.add_argument("--replace", action="store_true", help="replace a file that exists")
-    add_json(parser)
     add_threads(parser)
     add_columns(parser)
     add_topic(parser)
@@ -62,11 +58,11 @@ def main(arguments: argparse.Namespace) -> int:
         replace=arguments.replace,
         threads=arguments.threads,
         guard=Failures(print_error).skipping_failures,
-        watch=partial(_print_registration, arguments.json),
+        watch=_print_registration,
     )
     for found in recordings:
         if found.fault is None:
-            print_lines(str(found), sys.stderr if arguments.json else None)
+            print_lines(str(found))
         else:
             print_error(found.fault)
     untrusted = sum(found.untrusted for found in recordings)
@@ -74,23 +70,10 @@ def main(arguments: argparse.Namespace) -> int:
     return 2 if any(found.fault for found in recordings) else code
 
 
-def _print_registration(
-    as_json: bool, frame: Frame, found: Registration, stopwatch: Stopwatch
-) -> None:
-    unknown = math.isnan(found.residual)
-    facts = {
-        "scan": frame.name,
-        "metres": found.distance,
-        "degrees": found.turn,
-        "residual": None if unknown else found.residual,
-        "matched": found.matched,
-        "trusted": found.trusted,
-        "reason": found.reason,
-        "milliseconds": dict(stopwatch.milliseconds),
-    }
-    residual = "none" if unknown else f"{found.residual:.3f} m"
+def _print_registration(frame: Frame, found: Registration, stopwatch: Stopwatch) -> None:
+    residual = "none" if math.isnan(found.residual) else f"{found.residual:.3f} m"
     text = (
         f"{frame.name}: {found.distance:.2f} m, {found.turn:.2f} deg, residual {residual}, "
         f"{found.matched:.0%} matched, {sum(stopwatch.milliseconds.values()):.0f} ms"
     )
-    print_facts(facts, text if found.trusted else f"{text}, NOT TRUSTED", as_json)
+    print_line(text if found.trusted else f"{text}, NOT TRUSTED")

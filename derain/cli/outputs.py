@@ -40,7 +40,12 @@ def print_facts(facts: Mapping[str, Any], text: str, as_json: bool) -> None:
         text: As a line of text; a name in it may hold anything.
         as_json: True for JSON.
     """
-    tqdm.write(json.dumps(facts) if as_json else printable(text), sys.stdout)
+    print_line(json.dumps(facts) if as_json else text)
+
+
+def print_line(text: str) -> None:
+    """Prints what was done to a scan, above a progress bar; a name in it may hold anything."""
+    tqdm.write(printable(text), sys.stdout)
     sys.stdout.flush()  # so that the reader of a pipe gets each line at once
 
 

@@ -88,7 +88,7 @@ DATA_SET_DEFAULTS: dict[str, Any] = {
     "shard": None,
 }
 OF_NO_WORLD = ("layout", "scans", "radar", "speed", "traffic", "skew")
-SCAN_OPTIONS = ("columns", "picture", "json")
+SCAN_OPTIONS = ("columns", "picture")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -156,9 +156,6 @@ def _add_scan_options(group: "argparse._ArgumentGroup") -> None:
     add_columns(group, default=None)
     group.add_argument(
         "--picture", action="store_true", default=None, help="draw <stem>.png of each scan"
-    )
-    group.add_argument(
-        "--json", action="store_true", default=None, help="print one JSON object per scan"
     )
 
 
@@ -242,14 +239,14 @@ def _rain_on_scans(arguments: argparse.Namespace) -> int:
                     figure = before_after_figure(rainy, drops, f"{title}, and without its drops")
                     save(figure, sink.path(frame, ".png"))
                 written += 1
-                _print_rain(frame.name, clean, rainy, int(drops.sum()), arguments.json)
+                _print_rain(frame.name, clean, rainy, int(drops.sum()))
     return outputs.exit_code(len(failures.errors), len(source), "no rain could be added to {scans}")
 
 
-def _print_rain(name: str, clean: Scan, rainy: Scan, drops: int, as_json: bool) -> None:
+def _print_rain(name: str, clean: Scan, rainy: Scan, drops: int) -> None:
     """Prints the valid points of a scan before and after, how many are drops, and how many lost."""
     before, after = int(clean.valid.sum()), int(rainy.valid.sum())
     lost = before - (after - drops)
-    text = f"{name}: {before:,} points, in the rain {after:,}: {drops:,} of drops, {lost:,} lost"
-    facts = {"scan": name, "clean": before, "points": after, "rain": drops, "lost": lost}
-    outputs.print_facts(facts, text, as_json)
+    outputs.print_line(
+        f"{name}: {before:,} points, in the rain {after:,}: {drops:,} of drops, {lost:,} lost"
+    )

@@ -1,6 +1,5 @@
 """``derain odometry``: scans in, poses out, with a warning for each that is not to be trusted."""
 
-import json
 import re
 from pathlib import Path
 
@@ -53,19 +52,6 @@ def test_poses_are_written_and_found_beside_the_scans(run_derain, recording) -> 
     for number, frame in enumerate(named_frames([recording])):
         np.testing.assert_allclose(frame.pose[:3, 3], number * STEP, atol=0.05)
     assert {path.name for path in recording.parent.iterdir()} == {"velodyne", "poses.txt"}
-
-
-def test_json_is_an_object_a_scan(run_derain, recording, tmp_path) -> None:
-    outcome = run_derain("odometry", recording, "--out", tmp_path / "poses.txt", "--json")
-    facts = [json.loads(line) for line in outcome.out.splitlines()]
-    assert [each["trusted"] for each in facts] == 4 * [True]
-    assert facts[0]["metres"] == 0
-    assert facts[1]["metres"] == pytest.approx(0.9, abs=0.05)
-    assert facts[1].keys() == {
-        *("scan", "metres", "degrees", "residual", "matched", "trusted", "reason"),
-        "milliseconds",
-    }
-    assert "path 2.7 m" in outcome.err
 
 
 def test_the_summary_gives_a_speed_where_times_are_known(succeed, recording, tmp_path) -> None:
