@@ -90,6 +90,11 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
+def counted(number: int, thing: str) -> str:
+    """A number of things as text, such as ``1 scan`` and ``2,014 scans``."""
+    return f"{number:,} {thing}{'' if number == 1 else 's'}"
+
+
 def reason_of(error: Exception) -> str:
     """The message of an error in one line; its class if it has none, as a bare assert."""
     return " ".join(str(error).split()) or type(error).__name__

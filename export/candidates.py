@@ -9,7 +9,7 @@ import torch
 
 from derain.cards.card import DataCard
 from derain.cards.rain_found import require_rain
-from derain.errors import InputError
+from derain.errors import InputError, counted
 from derain.evaluation.counts import Counts
 from derain.export.onnx_file import evaluation_on_cpu
 from derain.models.base import DerainingModule
@@ -40,7 +40,7 @@ class FittedCandidates:
         found = self.after.true_positive / self.before.true_positive
         return (
             f"Candidates: {self.candidates}, {found:.2%} of that which the network finds\n"
-            f"IoU on these {self.scans} scans {self.before.iou:.4f} without them, "
+            f"IoU on {counted(self.scans, 'scan')} {self.before.iou:.4f} without them, "
             f"{self.after.iou:.4f} with them"
         )
 

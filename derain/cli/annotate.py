@@ -39,7 +39,7 @@ from tqdm import tqdm
 from derain.cards.known import lidar_folders
 from derain.cli.options import add_columns, factor, read_by
 from derain.cli.outputs import folder_sink, print_lines
-from derain.errors import InputError
+from derain.errors import InputError, counted
 from derain.fusion import LABEL_WITHIN, transfer_labels
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
@@ -110,7 +110,7 @@ def main(arguments: argparse.Namespace) -> int:
     title = f"sequence {sequence}, {Path(scan.name).name}: {len(scan):,} points"
     save(annotation_figure(scan, annotate(scan, scene, plane), scene, title), picture)
     lines = [
-        f"sequence {sequence}: {len(source):,} scans, {points.total():,} points",
+        f"sequence {sequence}: {counted(len(source), 'scan')}, {points.total():,} points",
         f"road: {plane.offset:.3f} m under the sensor, inclined by {plane.slope:.2f} degrees",
     ]
     for id_, name in CLASS_NAMES.items():

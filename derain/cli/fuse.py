@@ -31,7 +31,7 @@ from tqdm import tqdm
 from derain.cards.card import load_card
 from derain.cli.options import add_columns, factor, read_by
 from derain.cli.outputs import folder_sink, print_lines
-from derain.errors import InputError
+from derain.errors import InputError, counted
 from derain.files import write_scan
 from derain.files.atomic import replacing
 from derain.files.extrinsics import read_extrinsics
@@ -116,7 +116,7 @@ def main(arguments: argparse.Namespace) -> int:
             write_labels(labels / f"{frame.key}{LABEL}", fused.label, instances)
     _write_metadata(scans / METADATA, lidar, times, partners)
     alone = partners.count(None)
-    print_lines(f"{len(lidar)} scans in {scans}, {alone} of them without a radar frame")
+    print_lines(f"{counted(len(lidar), 'scan')} in {scans}, {alone} of them without a radar frame")
     return 0
 
 

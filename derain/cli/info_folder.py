@@ -10,7 +10,7 @@ from derain.cards.card import DataCard, load_card
 from derain.cards.known import card_by_folders, layouts_for
 from derain.cards.layout import Layout
 from derain.cli.unit_options import shard_of
-from derain.errors import InputError
+from derain.errors import InputError, counted
 from derain.evaluation.contents import (
     Contents,
     FrameCounting,
@@ -172,7 +172,8 @@ def draw(facts: FolderFacts, picture: Path) -> None:
     from derain.pictures.scan_pictures import save
 
     total = facts.total
-    title = f"{facts.folder.absolute().name}: {total.scans:,} scans, {total.points:,} points"
+    scans = counted(total.scans, "scan")
+    title = f"{facts.folder.absolute().name}: {scans}, {total.points:,} points"
     save(statistics_figure(facts.by_rain_rate, facts.classes, title), picture)
 
 

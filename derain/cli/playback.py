@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from derain.cli.outputs import print_error, print_lines
-from derain.errors import InputError
+from derain.errors import InputError, counted
 from derain.files.atomic import require_writable
 from derain.sources.judgement import Judgement
 from derain.sources.judging import Failures
@@ -52,7 +52,7 @@ def write_and_report(
     from derain.pictures.playback import write_playback
 
     scans = len(selection.frames)
-    print_lines(f"{scans:,} scans, methods: {', '.join(methods)}")
+    print_lines(f"{counted(scans, 'scan')}, methods: {', '.join(methods)}")
     notices = Notices()
     errors: set[str] = set()
 

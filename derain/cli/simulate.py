@@ -57,7 +57,7 @@ from tqdm import tqdm
 from derain.cli import outputs
 from derain.cli.options import add_columns, add_seed, count
 from derain.cli.unit_options import add_executor, add_shard, executor_of, shard_of
-from derain.errors import InputError
+from derain.errors import InputError, counted
 from derain.files import DEFAULT_COLUMNS
 from derain.scan import Scan
 from derain.simulation.campaign import FACILITY_RAIN_RATES, Campaign, Drive, partition
@@ -182,7 +182,7 @@ def main(arguments: argparse.Namespace) -> int:
     sequences = len(campaign.names)
     scans = sequences * (1 if in_world else arguments.scans)
     outputs.print_lines(
-        f"{arguments.out}: {sequences} sequences, {scans:,} scans. "
+        f"{arguments.out}: {counted(sequences, 'sequence')}, {counted(scans, 'scan')}. "
         f"To describe them: derain info {arguments.out}"
     )
     return 0

@@ -35,6 +35,7 @@ from derain.cli import options, unit_options
 from derain.cli.method_options import add_method_and_scans, method_and_scans, method_of
 from derain.cli.outputs import exit_code, print_error, print_facts, print_lines
 from derain.cli.parser import Parser
+from derain.errors import counted
 from derain.evaluation.counts import or_none
 from derain.evaluation.text_tables import number_text
 from derain.export.methods import over_recording
@@ -92,12 +93,12 @@ def main(arguments: argparse.Namespace) -> int:
             executor=executor,
         )
     stream = sys.stderr if arguments.json else sys.stdout
-    print_lines(f"{results.judged:,} scans\n{results.answers}", stream)
+    print_lines(f"{counted(results.judged, 'scan')}\n{results.answers}", stream)
     record = results.record
     if record is not None and record.scans:
         print_lines(
             f"for the record only, beside {record.card.title}'s own labels of "
-            f"{record.scans:,} scans, which changed nothing:\n{record}",
+            f"{counted(record.scans, 'scan')}, which changed nothing:\n{record}",
             stream,
         )
     if not results.manifest.finished:

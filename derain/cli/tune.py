@@ -29,7 +29,7 @@ from derain.cli.method_options import list_methods
 from derain.cli.outputs import print_lines
 from derain.cli.parser import Parser
 from derain.default import DEFAULT
-from derain.errors import InputError
+from derain.errors import InputError, counted
 from derain.export.storage import Storage
 from derain.files.atomic import require_writable
 from derain.filters import FILTERS
@@ -104,7 +104,7 @@ def main(arguments: argparse.Namespace) -> int:
     else:
         tuned = tuning.tune_model_on(method, data, drawn, threads)
     facts = (
-        f"IoU {tuned.iou:.4f} on {len(drawn)} scans of {data.card.name}, "
+        f"IoU {tuned.iou:.4f} on {counted(len(drawn), 'scan')} of {data.card.name}, "
         f"{tuned.default_iou:.4f} with the defaults"
     )
     command = f"derain {__version__}: {options.command_line(arguments, 'method')}"

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from derain.errors import InputError, printable
+from derain.errors import InputError, counted, printable
 from derain.jobs.unit import Record
 from derain.sources.frame import Frame
 from derain.views.scan_issues import ScanIssue
@@ -152,7 +152,7 @@ class CleanedTotals:
         return sorted(known, key=lambda each: each[1].visibility.shown)[:most]
 
     def __str__(self) -> str:
-        return f"{self.scans:,} scans: {counts(self.points, self.valid, self.rain)}"
+        return f"{counted(self.scans, 'scan')}: {counts(self.points, self.valid, self.rain)}"
 
 
 def counts(points: int, valid: int, rain: int) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from derain.errors import InputError
+from derain.errors import InputError, counted
 from derain.jobs.running import Submits, Task, run
 from derain.sources.clean_sink import CleanSink
 from derain.sources.cleaned_scan import CleanedScan, ScanOutcome, counts
@@ -54,8 +54,8 @@ class CleanReport:
         before = f" ({self.before:,} of them done before)" if self.before else ""
         failed = f", {self.not_cleaned:,} not cleaned" if self.not_cleaned else ""
         return (
-            f"{len(self.scans):,} scans{before}{failed}: {counts(points, valid, rain)}, "
-            f"{self.weather}; {odd:,} scans with warnings"
+            f"{counted(len(self.scans), 'scan')}{before}{failed}: {counts(points, valid, rain)}, "
+            f"{self.weather}; {counted(odd, 'scan')} with warnings"
         )
 
 

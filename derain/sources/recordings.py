@@ -6,7 +6,7 @@ Methods that use several scans and the warnings of bad weather need this; most m
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 
-from derain.errors import InputError
+from derain.errors import InputError, counted
 from derain.files.names import scan_stem
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame, times_of
@@ -69,8 +69,9 @@ def irregularities(
     short = [each for each in recordings if len(each) <= window.before + window.after]
     if short and needed:
         others = f" ({len(short):,} recordings are as short)" if len(short) > 1 else ""
+        scans = counted(len(short[0]), "scan")
         yield (
-            f"{short[0][0].name}: {_scans(len(short[0]))} in its recording{others}; the method "
+            f"{short[0][0].name}: {scans} in its recording{others}; the method "
             f"uses {window.before} scans before and {window.after} after each, and is less sure "
             "without them"
         )
@@ -109,8 +110,8 @@ def _irregular_steps(recording: Sequence[Frame], needed: bool) -> Iterator[str]:
     backwards = [frame for frame, step in zip(recording[1:], steps, strict=False) if step <= 0]
     if backwards:
         yield (
-            f"{backwards[0].name}: not later than the scan before it ({_scans(len(backwards))} in "
-            "all): name the scans in time order"
+            f"{backwards[0].name}: not later than the scan before it "
+            f"({counted(len(backwards), 'scan')} in all): name the scans in time order"
         )
     if not times or not needed:
         return
@@ -118,7 +119,7 @@ def _irregular_steps(recording: Sequence[Frame], needed: bool) -> Iterator[str]:
     if apart:
         yield (
             f"{apart[0].name}: more than {LONGEST_STEP:g} s after the scan before it "
-            f"({_scans(len(apart))} in all): such scans have little in common"
+            f"({counted(len(apart), 'scan')} in all): such scans have little in common"
         )
 
 
@@ -132,7 +133,3 @@ def _numbers(recording: Sequence[Frame]) -> list[int] | None:
 def _steps(places: Sequence[float]) -> list[float]:
     """Difference of each place but the first to the one before it."""
     return [after - before for before, after in pairwise(places)]
-
-
-def _scans(number: int) -> str:
-    return f"{number:,} scan{'' if number == 1 else 's'}"

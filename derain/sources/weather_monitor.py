@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from derain.errors import counted
 from derain.sources.frame import Frame
 from derain.sources.recordings import unbroken_recordings
 from derain.sources.source import Source
@@ -110,7 +111,7 @@ class WeatherMonitor:
             reach += "" if dry is None else f" (dry {dry})"
         text = f"visibility {self.total.visibility}{reach}"
         if not self._options.every_scan:
-            return f"{text} (of {self.scans} scans)"
+            return f"{text} (of {counted(self.scans, 'scan')})"
         levels = ", ".join(
             f"{self.scans_at[level]:,} {'open' if level is None else level}"
             for level in (*Level, None)

@@ -9,7 +9,7 @@ from typing import Protocol
 
 from tqdm import tqdm
 
-from derain.errors import printable
+from derain.errors import counted, printable
 
 
 class Notice(Protocol):
@@ -52,8 +52,7 @@ class Notices:
         """Prints the number of further scans of each kind."""
         for kind, scans in self._seen.items():
             if scans > 1:
-                more = "1 more scan" if scans == 2 else f"{scans - 1:,} more scans"
-                warn(f"{more}: {kind}")
+                warn(f"{counted(scans - 1, 'more scan')}: {kind}")
 
 
 def warn(text: str) -> None:

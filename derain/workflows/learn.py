@@ -7,7 +7,7 @@ from pathlib import Path
 
 from derain.annotation.manifest import FEWEST_SCANS
 from derain.datamodules.taught import Taught
-from derain.errors import InputError
+from derain.errors import InputError, counted
 from derain.export.methods import load_method, named_method, over_recording
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
@@ -59,10 +59,9 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
     """
     source = named_frames(config.recordings, config.columns, topic=config.topic)
     if len(source) < FEWEST_SCANS:
-        scans = "1 scan" if len(source) == 1 else f"{len(source)} scans"
         raise InputError(
             config.recordings[0],
-            f"{scans}: too few for training and validation",
+            f"{counted(len(source), 'scan')}: too few for training and validation",
             f"Record {FEWEST_SCANS} or more, one after the other; twenty are enough.",
         )
     student = student_of(config, source)
@@ -100,8 +99,7 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
         )
         write_report(results)  # the teacher's labels are worth a look, whatever follows
         _refuse_clean(results)
-        epochs = "1 epoch" if student.epochs == 1 else f"{student.epochs} epochs"
-        steps.begin(f"Training: {student}, {epochs}")
+        steps.begin(f"Training: {student}, {counted(student.epochs, 'epoch')}")
         trained = fit(student.config, _settings(config, student), quiet=True)
         scored = trained.iou is not None
         steps.end(f"IoU {trained.iou:.3f} on held-out scans, last epoch" if scored else "trained")

@@ -13,7 +13,7 @@ from tqdm import tqdm
 
 from derain.cards.card import DataCard, load_card
 from derain.cards.rain_found import warn_without_rain
-from derain.errors import reason_of
+from derain.errors import counted, reason_of
 from derain.evaluation.scores import ScoredMethod, Scores, score
 from derain.export.bench.bench_entries import BenchEntry, GivenMethod, bench_entries
 from derain.export.bench.cost import Effort, measure_cost
@@ -381,9 +381,8 @@ def _facts(
     """Everything that a bench depends on besides its methods, as JSON-able primitives."""
     card, frames = data.reader.card, data.frames
     others = [method.runtime.name for method in methods if method.usual]
-    scans = "1 scan" if len(frames) == 1 else f"{len(frames):,} scans"
     return {
-        "title": f"{card.title}, {scans}",
+        "title": f"{card.title}, {counted(len(frames), 'scan')}",
         "command": command,
         "data": card.name,
         "simulated": card.simulated,

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from derain.cards.card import DataCard
+from derain.errors import counted
 from derain.evaluation.counts import SCORES, Counts, mean_over_scans
 from derain.evaluation.published_tables import PaperTable, PublishedRow
 from derain.evaluation.text_tables import markdown_table, number_text
@@ -193,10 +194,9 @@ def with_published_rows(
 def _changed_cells(row: Mapping[str, Any]) -> list[str]:
     if "failure" in row:
         return [row["method"], row["failure"], "-", "-", "-"]
-    scans = "1 scan" if row["scans"] == 1 else f"{row['scans']:,} scans"
     return [
         row["method"],
-        f"{scans}, {row['points']:,} points or pixels",
+        f"{counted(row['scans'], 'scan')}, {row['points']:,} points or pixels",
         f"{row['largest_difference']:.1e}",
         f"{row['flipped']:,}",
         number_text(row["rain_iou"], ".4f"),

@@ -6,7 +6,7 @@ from pathlib import Path
 import lightning
 from lightning.pytorch.loggers import TensorBoardLogger
 
-from derain.errors import printable
+from derain.errors import counted, printable
 from derain.evaluation.counts import SCORES, or_none
 from derain.evaluation.metrics import RainMetrics
 from derain.evaluation.text_tables import number_text
@@ -63,7 +63,8 @@ def as_text(metrics: RainMetrics, data: str) -> str:
     """Scores and counts as three small tables; ``-`` is a score that is undefined."""
     measured = metrics.counts()
     scores = {name: float(score) for name, score in metrics.compute().items()}
-    lines = [f"{data}, {len(measured.per_scan)} scans      precision  recall      F1     IoU"]
+    scans = counted(len(measured.per_scan), "scan")
+    lines = [f"{data}, {scans}      precision  recall      F1     IoU"]
     width = lines[0].index("precision")
     for average, suffix in (("pooled over points", ""), ("mean over scans", "_per_scan")):
         lines.append(average.ljust(width) + _row([scores[score + suffix] for score in SCORES]))

@@ -80,7 +80,7 @@ def test_candidates_are_fitted_to_labelled_scans_and_their_cost_is_printed(
     derainer, of_all = Derainer(out, 1), Derainer(onnx_model, 1)
     candidates = derainer.spec.candidates
     assert f"Candidates: {candidates}, " in outcome.out
-    assert "% of that which the network finds\nIoU on these 2 scans 0." in outcome.out
+    assert "% of that which the network finds\nIoU on 2 scans 0." in outcome.out
     for scan in map(read_scan, few):
         np.testing.assert_array_equal(derainer(scan), of_all(scan) & candidates.among(scan))
     assert f"candidates: {candidates}" in succeed("info", out).out
