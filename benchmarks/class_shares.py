@@ -58,6 +58,9 @@ def _print_distances(root: Path) -> None:
     data = Simulated(str(root), make=False)
     scans = map(data.read, data.frames("test"))
     distance = np.concatenate([scan.range[data.card.rain_of(scan)] for scan in scans])
+    if not len(distance):
+        print("\nno rain in the test scans")
+        return
     median, most = np.percentile(distance, [50, 90])
     print(f"\ndistance of rain in the test scans: median {median:.1f} m, 90 % within {most:.1f} m")
 

@@ -145,7 +145,7 @@ def read_scene(path: Path) -> Scene:
         for name in corrections:
             if name not in scene.boxes:
                 place = f"{path}: corrections.{sequence}.boxes.{name}"
-                remedy = f"Available: {', '.join(scene.boxes)}."
+                remedy = f"Available: {', '.join(scene.boxes) or 'none'}."
                 raise InputError(place, "there is no such box", remedy)
     return scene
 

@@ -4,6 +4,7 @@ Types refuse impossible values before any work.
 """
 
 import argparse
+import math
 import shlex
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -21,11 +22,13 @@ if TYPE_CHECKING:
     from derain.datamodules.labelled import LabelledScans
 
 
-def count(text: str, least: int = 1) -> int:
+def count(text: str, least: int = 1, most: float = math.inf) -> int:
     """A whole number of 1 or more."""
     value = whole(text)
     if value < least:
         raise argparse.ArgumentTypeError(f"{text} is less than {least}")
+    if value > most:
+        raise argparse.ArgumentTypeError(f"{text} is more than {most}")
     return value
 
 

@@ -50,6 +50,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 
 from derain.cli import options, unit_options, weather_options
@@ -74,6 +75,7 @@ from derain.sources.stored_frame import StoredBag
 from derain.stores.url import Place, is_url, place_of
 from derain.system.notices import Notices, warn
 from derain.views.scan_issues import MOST_RAIN, ScanIssue
+from derain.views.window import MOST_SCANS
 from derain.weather.record import weather_row
 
 # Options that only --help-all shows.
@@ -107,11 +109,12 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument(
         "--probability", action="store_true", help=f"add the column {RAIN_PROBABILITY} to the scans"
     )
+    around = partial(options.count, least=0, most=MOST_SCANS)
     parser.add_argument(
-        "--past", type=int, metavar="N", help=f"use N scans before each scan (default: {PAST})"
+        "--past", type=around, metavar="N", help=f"use N scans before each scan (default: {PAST})"
     )
     parser.add_argument(
-        "--delay", type=int, metavar="N", help=f"use N scans after each scan (default: {DELAY})"
+        "--delay", type=around, metavar="N", help=f"use N scans after each scan (default: {DELAY})"
     )
     parser.add_argument("--alone", action="store_true", help="judge each scan by itself")
     options.add_poses(parser)

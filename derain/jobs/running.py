@@ -296,7 +296,8 @@ def values(
         elif task.job is None:
             raise error
         else:
-            warn(f"{done.id}: {error}")
+            if failures:  # the first one is in the error below
+                warn(f"{done.id}: {error}")
             failures.append(error)
     if failures:
         raise InputError(

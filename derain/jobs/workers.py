@@ -85,10 +85,11 @@ class WorkerPool(ThreadPoolExecutor):
             self._idle.put(worker)
         if self._ended:
             raise CancelledError
+        fewer = "; fewer --workers need less" if len(self._workers) > 1 else ""
         raise InputError(
             "worker",
             f"its process died {TRIES} times",
-            "Check whether the memory is full; fewer --workers need less.",
+            f"Check whether the memory is full{fewer}.",
         )
 
 

@@ -153,8 +153,10 @@ def bench(
 
     Raises:
         InputError: A method that is not known or cannot be read, or two of one title; no scans, or
-            one that cannot be read or has no labels. The row of a method that fails states so.
+            one that cannot be read or has no labels; nothing to time. The row of a method that
+            fails states so.
     """
+    effort = Effort(threads, timed, repeats, seed)
     card = card if isinstance(card, DataCard) else load_card(card)
     reader = FrameReader(card, intensity_scale, distinct=card.deduplicate)
 
@@ -164,7 +166,6 @@ def bench(
     learn_from = None if train is None else labelled(train).truths
     rows = bench_entries(methods, learn_from, Runtime(runtime, precision))
     titles = ", ".join(repr(row.title) for row in rows)
-    effort = Effort(threads, timed, repeats, seed)
     return run_bench(rows, labelled(scans), effort, command=f"derain.bench([{titles}], ...)")
 
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from derain.errors import reason_of
+from derain.errors import InputError, reason_of
 from derain.export.bench.bench_entries import BenchEntry
 from derain.export.timing import RunTimes, timed_runs
 from derain.jobs.workers import WorkerPool
@@ -25,12 +25,20 @@ class Effort:
         timed: Scans that each method is timed on, at most, spread evenly.
         repeats: Timed runs on each of them.
         seed: Random seed of the bootstrap intervals.
+
+    Raises:
+        InputError: No scan, or no run, to time.
     """
 
     threads: int = 0
     timed: int = 10
     repeats: int = 3
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("timed", "repeats"):
+            if (number := getattr(self, name)) < 1:
+                raise InputError(name, f"{number} is too few", "Give 1 or more.")
 
 
 @dataclass(frozen=True)

@@ -125,3 +125,4 @@ def test_what_cannot_be_meant_is_named_by_its_key(tmp_path, text, key, reason) -
     path = tmp_path / "scene.yaml"
     assert str(raised.value.subject) == (f"{path}: {key}" if key else str(path))
     assert reason in raised.value.reason
+    assert not raised.value.remedy.endswith(": .")

@@ -110,6 +110,7 @@ def test_nothing_is_left_where_the_output_cannot_be_written(
         (["dror", "scans", "--poses", "odometry"], "--poses: odometry is no file"),
         (["dror", "scans", "--warning", "40", "30"], "Give two numbers of metres, the second"),
         (["dror", "scans", "--error", "35", "38"], "does not lie below the warning"),
+        (["{model}", "scans", "--past", "51"], "--past: 51 is more than 50"),
     ],
 )
 def test_what_cannot_be_used_is_refused_before_any_work(

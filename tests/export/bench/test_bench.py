@@ -161,6 +161,9 @@ def test_a_method_that_cannot_be_used_is_refused(methods, reason) -> None:
 def test_scans_that_cannot_be_benched_are_refused(labelled) -> None:
     with pytest.raises(InputError, match="scans: there are none"):
         bench(["all"], [], labelled.reader.card)
+    for amount in ({"timed": 0}, {"repeats": 0}):
+        with pytest.raises(InputError, match=f"{next(iter(amount))}: 0 is too few"):
+            bench(["all"], labelled.frames, labelled.reader.card, **amount)
     labelled.frames[0].label_path.unlink()
     with pytest.raises(InputError, match="its labels are not at"):
         bench(["all"], labelled.frames, labelled.reader.card)

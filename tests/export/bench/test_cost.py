@@ -1,5 +1,6 @@
 """What methods cost: every run of every scan, each method alone, and a failure that is stated."""
 
+import os
 import sys
 from functools import partial
 
@@ -27,3 +28,14 @@ def test_a_method_that_cannot_be_timed_states_why(labelled) -> None:
     assert cost.failure.startswith("moved.onnx: no such method or file")
     assert np.isnan(cost.times.percentile(50))
     assert cost.peak_memory is None
+
+
+def test_the_error_of_a_process_that_died_does_not_advise_fewer_of_them(labelled) -> None:
+    cost = measure_cost(BenchEntry("dying", "dying", die), labelled.frames, Effort(repeats=1))
+    assert "died" in cost.failure
+    assert "--workers" not in cost.failure
+
+
+def die(threads: int) -> None:
+    """Ends the process, as the system does where memory is full."""
+    os._exit(threads)
