@@ -15,10 +15,10 @@ from derain.recordings.rays import RayEvidence, Rays, mean_evidence, ray_evidenc
 from derain.scan import Float32s, Floats, Ints, Scan
 from derain.sources.judgement import Judgement
 from derain.sources.recent_frames import FrameInWindow
+from derain.sources.window import Window, WindowOfScans
 from derain.system.stopwatch import Stopwatch
 from derain.views.morton import evenly
 from derain.views.scan_issues import ScanIssue
-from derain.views.window import Window, WindowOfScans
 
 # Points to which a model gives a lower probability keep it: hardly any of them is rain.
 DOUBTFUL = 0.01

@@ -12,9 +12,9 @@ from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
 from derain.sources.recent_frames import FrameInWindow, RecentFrames
+from derain.sources.window import PlacedScan, Window
 from derain.system.stopwatch import Stopwatch
 from derain.views.scan_issues import ScanIssue
-from derain.views.window import PlacedScan, Window
 
 
 @dataclass(frozen=True)

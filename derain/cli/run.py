@@ -72,10 +72,10 @@ from derain.sources.method import Method
 from derain.sources.recordings import irregularities
 from derain.sources.store_listing import frames_at
 from derain.sources.stored_frame import StoredBag
+from derain.sources.window import MOST_SCANS
 from derain.stores.url import Place, is_url, place_of
 from derain.system.notices import Notices, warn
 from derain.views.scan_issues import MOST_RAIN, ScanIssue
-from derain.views.window import MOST_SCANS
 from derain.weather.record import weather_row
 
 # Options that only --help-all shows.

@@ -16,6 +16,7 @@ import json
 
 from derain.cli.outputs import print_lines
 from derain.cli.parser import Parser
+from derain.errors import counted
 from derain.jobs.job import Job, JobStatus, job_status
 from derain.sources.cleaned_scan import CleanedTotals
 from derain.stores.url import place_of
@@ -52,16 +53,16 @@ def _lines(status: JobStatus, cleaned: CleanedTotals | None) -> list[str]:
         lines.append(str(cleaned))
         done, what = cleaned.scans, "scans"
     if seconds := sum(status.seconds.values()):
-        workers = len(status.seconds)
-        number = "1 worker" if workers == 1 else f"{workers:,} workers"
-        lines.append(f"{done / seconds:.2f} {what} a second a worker, {number}")
+        workers = counted(len(status.seconds), "worker")
+        lines.append(f"{done / seconds:.2f} {what} a second a worker, {workers}")
     if cleaned is not None:
         hours = cleaned.worst_hours()
         lines += [f"visibility {weather.visibility}: {hour}" for hour, weather in hours]
     shown = status.failed[:MOST_FAILED]
     lines += [f"failed: {record.unit}: {record.failures[0]}" for record in shown]
     if len(status.failed) > MOST_FAILED:
-        lines.append(f"failed: {len(status.failed) - MOST_FAILED:,} more units")
+        more = len(status.failed) - MOST_FAILED
+        lines.append(f"failed: {counted(more, 'more unit')}")
     if status.array is not None:
         lines.append(f"to be run again: --array={status.array}")
     return lines

@@ -2,12 +2,10 @@
 
 import shlex
 
+from derain.cli.parser import HELP_ALL
 from derain.errors import InputError
 from derain.system.extras import TRAINING_LIBRARIES, require
 from derain.workflows.configurations import packaged_configs, require_configuration
-
-# What `--help` becomes where all options are to be listed.
-ALL = "--help-all"
 
 EXAMPLES = {
     "fit": """\
@@ -38,12 +36,12 @@ Writes the labels that a checkpoint gives the test scans. The scans need no labe
 """,
 }
 
-# The options that most runs need; `ALL` lists those that any run can have.
+# The options that most runs need; `HELP_ALL` lists those that any run can have.
 OPTIONS = """\
   --config FILE                     configuration: a YAML file, or the name of a packaged one
   --data.root FOLDER                root folder of the data set
   --ckpt_path FILE                  checkpoint to continue, to measure or to use
-  --start MODEL                     start with the weights of a trained model: a file, or default
+  --start MODEL                     start with trained weights: a checkpoint, or default
   --trainer.max_epochs N            passes over the training scans
   --trainer.devices N               devices, or processes on a CPU
   --trainer.accelerator NAME        cpu, gpu, ...
@@ -65,7 +63,8 @@ def _short_help(command: str) -> str:
         f"usage: derain {command} --config FILE [--OPTION VALUE ...]\n\n{EXAMPLES[command]}\n"
         f"packaged configurations:\n{configurations}\n\noptions:\n{OPTIONS}\n\n"
         "A configuration can set any option, and an option can set any key of a configuration.\n"
-        f"All options: derain {command} {ALL}. All values, as they would be used: --print_config."
+        f"All options: derain {command} {HELP_ALL}. "
+        "All values, as they would be used: --print_config."
     )
 
 
@@ -91,7 +90,7 @@ def train(arguments: list[str]) -> int:
     from derain.workflows.progress import EpochLines
     from derain.workflows.training import checkpoint_of_run, run_trainer
 
-    words = ["--help" if argument == ALL else argument for argument in arguments]
+    words = ["--help" if argument == HELP_ALL else argument for argument in arguments]
     callbacks = {"callbacks": [EpochLines()]}
     try:
         trainer = run_trainer(words, EXAMPLES[arguments[0]], callbacks).trainer

@@ -15,11 +15,11 @@ from derain.scan import Bools, Floats, Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.recent_frames import FrameInWindow
+from derain.sources.window import Window, WindowOfScans
 from derain.system.cores import threads_of
 from derain.system.stopwatch import Stopwatch
 from derain.views.one_viewpoint import viewpoint_issues
 from derain.views.scan_issues import ScanIssue, intensity_in_places
-from derain.views.window import Window, WindowOfScans
 
 
 @dataclass(frozen=True)

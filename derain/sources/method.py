@@ -13,9 +13,9 @@ from derain.errors import ScanWarning
 from derain.scan import Array, Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
+from derain.sources.window import Window
 from derain.system.stopwatch import Stopwatch
 from derain.views.scan_issues import ScanIssue, much_removed
-from derain.views.window import Window
 
 
 class Method(ABC):

@@ -10,7 +10,7 @@ from derain.errors import InputError
 from derain.files.reading import reading
 from derain.scan import Scan
 from derain.sources.frame import Frame, MemoryFrame
-from derain.views.window import PlacedScan, Window, WindowOfScans
+from derain.sources.window import PlacedScan, Window, WindowOfScans
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from derain.errors import InputError, counted
 from derain.files.names import scan_stem
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame, times_of
-from derain.views.window import Window
+from derain.sources.window import Window
 
 # Seconds. Sensors take ten or twenty scans per second. In more than one second, a car drives so far
 # that two scans have few places in common.

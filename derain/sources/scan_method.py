@@ -8,8 +8,8 @@ from derain.scan import Array, Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
+from derain.sources.window import Window
 from derain.system.stopwatch import Stopwatch
-from derain.views.window import Window
 
 
 class ScanMethod(Method):

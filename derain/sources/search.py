@@ -10,7 +10,7 @@ from derain.bags.names import SUFFIXES as BAG_SUFFIXES
 from derain.bags.names import bags_at, is_bag, split
 from derain.cards.known import known_layouts
 from derain.cards.layout import Layout
-from derain.errors import InputError
+from derain.errors import InputError, counted
 from derain.files import RECORDS, find_scans
 from derain.files.atomic import writing
 from derain.files.format import FORMATS
@@ -115,9 +115,7 @@ def _laid_out(root: Path, layouts: Sequence[Layout] | None) -> list[Path]:
 def _warn_of_others_beside(folder: Path, search: "_Search") -> None:
     """Warns of recordings beside the bags or sequences that lie directly in a folder."""
     if others := [*search.inside(folder)]:
-        recordings = (
-            "1 other recording" if len(others) == 1 else f"{len(others):,} other recordings"
-        )
+        recordings = counted(len(others), "other recording")
         warn_once(
             f"{folder}: {recordings} passed over, such as {others[0]}; name them to read them"
         )

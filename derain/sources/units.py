@@ -20,9 +20,9 @@ from derain.sources.frame import Frame
 from derain.sources.method import Method
 from derain.sources.recordings import recordings_of
 from derain.sources.stored_frame import StoredBag, StoredFrame
+from derain.sources.window import Window
 from derain.stores.mirror import mirror
 from derain.stores.url import Place, is_url
-from derain.views.window import Window
 
 # Scans of a block: a few seconds of a drive, beside which the scans around a block that are read
 # once more take little.

@@ -8,7 +8,7 @@ import lightning
 import torch
 from lightning.pytorch.callbacks import BasePredictionWriter
 
-from derain.errors import printable
+from derain.errors import counted, printable
 from derain.learning.batch import Batch
 from derain.learning.task import ReadableScans
 from derain.models.base import DerainingModule
@@ -69,5 +69,5 @@ class PredictionWriter(BasePredictionWriter):
         of_this = torch.tensor(self.written, device=model.device)
         written = int(trainer.strategy.reduce(of_this, reduce_op="sum"))
         if trainer.is_global_zero:
-            files = "1 label file" if written == 1 else f"{written:,} label files"
+            files = counted(written, "label file")
             print(printable(f"Wrote {files} to {self.sink.folder}"))

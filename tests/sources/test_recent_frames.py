@@ -8,7 +8,7 @@ from derain.evaluation.hard_cases import scene
 from derain.scan import Scan
 from derain.sources.frame import MemoryFrame
 from derain.sources.recent_frames import FrameInWindow, RecentFrames
-from derain.views.window import PlacedScan, Window
+from derain.sources.window import PlacedScan, Window
 
 SCAN = Scan.of(scene(1))
 

@@ -8,7 +8,7 @@ from derain.scan import Scan
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame, MemoryFrame
 from derain.sources.recordings import irregularities, recordings_of, unbroken_recordings
-from derain.views.window import Window
+from derain.sources.window import Window
 
 SEVERAL = Window(1, 1)
 

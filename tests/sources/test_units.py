@@ -26,7 +26,7 @@ from derain.sources.source import Source
 from derain.sources.unit_cleaning import UnitCleaning
 from derain.sources.units import Division, units_of
 from derain.sources.weather_monitor import WeatherOptions
-from derain.views.window import Window
+from derain.sources.window import Window
 
 SCANS = 7
 

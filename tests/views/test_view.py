@@ -17,7 +17,6 @@ from derain.views.neighbours import Neighbourhoods, NeighbourView
 from derain.views.range_image import RangeView
 from derain.views.spherical_grid import ALL_AROUND, grid_of
 from derain.views.view import VIEWS, View
-from derain.views.window import Window
 
 from ..test_spec import SPEC
 
@@ -45,17 +44,6 @@ def test_a_view_reads_back_what_it_writes(view) -> None:
     if isinstance(view, NeighbourView):
         expected = replace(expected, threads=3)
     assert type(view).of(entry, channels, fill_value, threads=3) == expected
-
-
-@pytest.mark.parametrize("wrong", [-1, 51, 1.5, "two", None])
-@pytest.mark.parametrize("side", ["before", "after"])
-def test_a_window_has_a_number_of_scans_that_memory_holds(side, wrong) -> None:
-    with pytest.raises(InputError, match=rf"window: {side}: .* from 0 to 50"):
-        Window(**{side: wrong})
-
-
-def test_a_window_of_a_number_of_numpy_is_the_same_as_one_of_a_number() -> None:
-    assert repr(Window(np.int64(1), np.uint8(2))) == repr(Window(1, 2))
 
 
 @pytest.fixture
