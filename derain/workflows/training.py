@@ -34,7 +34,7 @@ from derain.files.atomic import replacing
 from derain.files.documents import Entry
 from derain.models.base import DerainingModule
 from derain.models.callbacks.best_checkpoint import BestCheckpoint
-from derain.models.callbacks.panels import Dashboard, Panels
+from derain.models.callbacks.panels import Panels
 from derain.models.callbacks.prediction import PredictionWriter
 from derain.models.callbacks.report import TestReport
 from derain.models.callbacks.step_times import StepTimes
@@ -130,7 +130,6 @@ class DerainCLI(LightningCLI):
         parser.add_lightning_class_args(LearningRateMonitor, "learning_rate")
         parser.add_lightning_class_args(Panels, "panels")
         parser.add_lightning_class_args(StepTimes, "step_times")
-        parser.add_lightning_class_args(Dashboard, "dashboard")
         parser.add_lightning_class_args(PredictionWriter, "predictions")
         parser.add_lightning_class_args(TestReport, "report")
         parser.add_lightning_class_args(ScanCheck, "scan_check")

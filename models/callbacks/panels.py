@@ -45,6 +45,8 @@ CHARTS = {
 class Panels(lightning.Callback):
     """Logs what is judged wrongly, of every validation as numbers, of some as pictures.
 
+    The numbers have charts on a page that is laid out by the questions of ``CHARTS``.
+
     As numbers: the share of each class that is judged wrongly, and by range the share of the rain
     that is left and of all else that is lost. As pictures: input, truth and prediction of the first
     rainy validation scans; and, also of the test, a table by class and range, and the
@@ -64,6 +66,15 @@ class Panels(lightning.Callback):
         # The scans to show, what is called rain in each, and its rain.
         self.shown: list[tuple[Scan, Bools, Bools]] = []
         self.undrawn: int | None = None  # step of the last validation, where it was not drawn
+
+    def on_train_start(self, trainer: lightning.Trainer, *_: Any) -> None:
+        """Writes the layout of the page, which TensorBoard keeps with the run."""
+        layout = {
+            question: {title: ["Multiline", tags] for title, tags in charts.items()}
+            for question, charts in CHARTS.items()
+        }
+        for writer in _writers(trainer):
+            writer.add_custom_scalars(layout)
 
     def on_validation_epoch_start(self, trainer: lightning.Trainer, *_: Any) -> None:
         """Begins with the first scan again; the order of validation scans is fixed."""
@@ -166,17 +177,3 @@ def _of_curve(points: OperatingPoints) -> tuple[Floats | Ints, ...]:
     hits, false = points.true_positive[even], points.false_positive[even]
     negatives, misses = points.other - false, points.rain - hits
     return hits, false, negatives, misses, points.precision[even], points.recall[even]
-
-
-class Dashboard(lightning.Callback):
-    """Lays out the page at the start of a training."""
-
-    def on_train_start(self, trainer: lightning.Trainer, *_: Any) -> None:
-        """Writes the layout, which TensorBoard keeps with the run."""
-        for writer in _writers(trainer):
-            writer.add_custom_scalars(
-                {
-                    question: {title: ["Multiline", tags] for title, tags in charts.items()}
-                    for question, charts in CHARTS.items()
-                }
-            )

@@ -19,7 +19,7 @@ from derain.evaluation.hard_cases import scene
 from derain.evaluation.operating_points import CURVE_THRESHOLDS
 from derain.files.labels import write_labels
 from derain.models.callbacks import panels
-from derain.models.callbacks.panels import CHARTS, Dashboard, Panels
+from derain.models.callbacks.panels import CHARTS, Panels
 from derain.models.outdet import OutDet
 from derain.pictures.error_pictures import errors_figure
 from derain.scan import Bools, Scan
@@ -201,7 +201,7 @@ def test_scans_without_labels_have_no_errors(make_trainer, data, tmp_path) -> No
 
 
 def test_the_layout_names_what_is_logged(train) -> None:
-    _, _, events = train(1, Dashboard())
+    _, _, events = train(1, Panels(0))
     (layout,) = events.Tensors("custom_scalars__config__")
     content = layout.tensor_proto.string_val[0]
     for question, charts in CHARTS.items():
