@@ -40,7 +40,6 @@ def write_data() -> None:
             "init_args": {"root": "scans", "card": "wads", **parts},
         },
         "panels": {"scans": 0},
-        "errors": {"pictures": 0},
     }
     CONFIG.write_text(yaml.safe_dump(configuration))
 
