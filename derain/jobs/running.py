@@ -288,7 +288,7 @@ def values(
         InputError: A unit failed; or as for :func:`run`.
     """
     found: list[Any] = []
-    failures: list[InputError] = []
+    failures: dict[str, InputError] = {}  # by unit
     results = run(task, shard, executor)
     for done, value, _ in tqdm(results, total=len(shard), desc=doing, unit=unit, disable=None):
         if (error := value.error) is None:
@@ -298,12 +298,14 @@ def values(
         else:
             if failures:  # the first one is in the error below
                 warn(f"{done.id}: {error}")
-            failures.append(error)
+            failures[done.id] = error
     if failures:
+        failed, first = next(iter(failures.items()))
         raise InputError(
-            failures[0].subject,
-            f"{failures[0].reason}, so that {len(failures):,} of {len(shard):,} {unit}s failed",
-            f"{failures[0].remedy} The same command retries them.",
+            first.subject,
+            f"{first.reason}, so that {len(failures):,} of {len(shard):,} {unit}s failed, first "
+            f"{failed}",
+            f"{first.remedy} The same command retries them.",
         )
     if len(shard) == len(units):
         return found
