@@ -28,11 +28,11 @@ from derain.cli.options import add_columns, add_poses, add_topic, count, file_na
 from derain.cli.outputs import print_lines
 from derain.cli.playback import refuse_unusable, write_and_report
 from derain.default import DEFAULT
+from derain.learning.start import START_HELP
 from derain.sources.method import Method
 from derain.stores.url import place_of
 from derain.system.extras import EXPORT_LIBRARIES, TRAINING_LIBRARIES, require
 from derain.workflows.learn_config import STUDENTS, LearnConfig
-from derain.workflows.start import START_HELP
 
 # The Rerun file shows this many scans of a long recording, spread over all of it.
 MOST_SHOWN = 100

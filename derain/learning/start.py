@@ -1,12 +1,17 @@
 """A trained model that another one begins from, in place of weights drawn at random."""
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
+from derain.default import DEFAULT, default_checkpoint
+from derain.errors import InputError
 from derain.sources.training_record import record_of_parts
 from derain.spec import Spec
 
 # What a Spec's record of training has the models under that it began from, the first one first.
 STARTED_FROM = "started from"
+
+START_HELP = f"begin from the weights of a trained model: a checkpoint, or {DEFAULT}"
 
 
 @dataclass(frozen=True)
@@ -46,3 +51,25 @@ class Start:
             std=self.spec.std,
             rule=self.spec.rule,
         )
+
+
+def checkpoint_of(start: str) -> Path:
+    """The checkpoint of the model that a user names.
+
+    Args:
+        start: A checkpoint, or ``default``.
+
+    Raises:
+        InputError: An ONNX file, whose weights are folded for deployment: no training goes on from
+            them.
+    """
+    if start == DEFAULT:
+        return default_checkpoint()
+    if Path(start).suffix == ".onnx":
+        raise InputError(
+            start,
+            "no training goes on from an ONNX file, whose weights are folded",
+            "Give its checkpoint: student.ckpt in the folder of `derain learn`, or best.ckpt in "
+            "the checkpoints of the run.",
+        )
+    return Path(start)

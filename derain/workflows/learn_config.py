@@ -10,12 +10,12 @@ from derain.default import DEFAULT
 from derain.errors import InputError
 from derain.export.methods import CUES
 from derain.files import DEFAULT_COLUMNS
+from derain.learning.start import checkpoint_of
 from derain.scan import Scan
 from derain.sources.judging import Failures
 from derain.sources.source import Source
 from derain.spec import Spec
 from derain.workflows.configurations import packaged_configs
-from derain.workflows.start import checkpoint_of
 
 PERSISTENCE = "persistence"
 

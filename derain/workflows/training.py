@@ -32,6 +32,7 @@ from derain.datamodules.worlds import Worlds
 from derain.errors import InputError, reason_of
 from derain.files.atomic import replacing
 from derain.files.documents import Entry
+from derain.learning.start import START_HELP, checkpoint_of
 from derain.models.base import DerainingModule
 from derain.models.callbacks.best_checkpoint import BestCheckpoint
 from derain.models.callbacks.panels import Panels
@@ -54,7 +55,6 @@ from derain.system.memory import KEPT_IN_TRAINING, keep_freed_memory
 from derain.system.open3d_import import warn_where_tensorboard_cannot_start
 from derain.system.workers import exit_with_launcher
 from derain.workflows.configurations import with_packaged_configs
-from derain.workflows.start import START_HELP, checkpoint_of
 from derain.workflows.training_errors import (
     as_input_error,
     known_options,

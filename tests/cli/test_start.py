@@ -9,10 +9,9 @@ import torch
 from derain import default
 from derain.cards.card import load_card
 from derain.errors import InputError
-from derain.learning.start import STARTED_FROM
+from derain.learning.start import STARTED_FROM, checkpoint_of
 from derain.models.checkpoint import load_model, save_model
 from derain.models.outdet import OutDet
-from derain.workflows.start import checkpoint_of
 
 
 def trained(path: Path) -> OutDet:
