@@ -27,6 +27,7 @@ from derain.errors import InputError
 from derain.evaluation.answers import NOT_KNOWN, TEACHERS_ANSWERS, Answers, TruthRecord
 from derain.files.atomic import write_text
 from derain.files.labels import LABEL, write_labels
+from derain.jobs.job import FOLDER
 from derain.jobs.running import IsThere, Submits, Task, completed, run
 from derain.scan import Ints
 from derain.sources.file_frame import FileFrame
@@ -38,6 +39,7 @@ from derain.sources.sink import FolderSink, LabelSink
 from derain.sources.source import Source
 from derain.sources.unit_judging import UnitJudging
 from derain.sources.units import Division, FrameUnit, units_of, whole
+from derain.stores.documents import documents_at
 from derain.system.stopwatch import Stopwatch
 from derain.views.scan_issues import ScanIssue, much_removed
 
@@ -195,6 +197,7 @@ def teach(
     unfinished = Manifest(method.as_dict(), finished=False)
     if division is None or not division.keeps_records(source, out):
         unfinished.write(out)
+        documents_at(work.out, FOLDER).remove_all()  # of labels that are replaced now
         frames = _known(work.do(whole(source)), len(source), guard, watch)
         return _finish(work, out, frames)
     options = work.options("teach", source, division.block)

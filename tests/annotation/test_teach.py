@@ -22,6 +22,7 @@ from derain.sources.folders import named_frames
 from derain.sources.judgement import Judgement
 from derain.sources.judging import judgements
 from derain.sources.source import Frames, Source
+from derain.sources.units import Division
 
 POINTS = 200
 
@@ -121,6 +122,17 @@ def test_a_second_teaching_takes_the_place_of_the_first(drive, tmp_path) -> None
     teach(FilterDerainer(DROR(), 1), of(drive)[:4], out)
     teach(FilterDerainer(DROR(), 1), of(drive)[:4], tmp_path / "alone")
     assert contents(out) == contents(tmp_path / "alone")
+
+
+def test_records_of_labels_that_another_teaching_replaced_are_not_believed(drive, tmp_path) -> None:
+    out, first = tmp_path / "taught", tmp_path / "first"
+    recorded = Division(keep_records=True)
+    teach(Between(), of(drive), first, division=recorded)
+    for method, division in ((Between(), recorded), (FilterDerainer(DROR(), 1), None)):
+        teach(method, of(drive), out, division=division)
+    teach(Between(), of(drive), out, division=recorded)
+    labels = [contents(folder / LABELS) for folder in (out, first)]
+    assert labels[0] == labels[1]
 
 
 @pytest.mark.parametrize("there", [True, False])
