@@ -17,8 +17,8 @@ around each. derain writes the labels, their data card and a list of the scans; 
 their place. The last fifth of each sequence is the validation part. Scans without any known point
 are left out.
 For more than --block scans derain keeps records in --out: a run that was stopped resumes, and
-`derain status` prints its progress. Processes, a Dask cluster and shards write the same bytes; the
-labels are moved into place when all are there. If scans of a shard failed, the same command without
+`derain status` prints its progress. Processes, a Dask cluster and shards write the same bytes; no
+training takes the labels before all are there. If scans of a shard failed, the same command without
 --shard completes the labels.
 With --card, the data card of the scans' own labels, derain also compares its labels with these, for
 the record only: they do not change the result.
