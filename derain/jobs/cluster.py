@@ -74,7 +74,7 @@ def _refuse_other_versions(client: Any) -> None:
     if not workers:
         warn("--dask: the scheduler has no workers yet; scans wait for them")
     here = versions["client"]["packages"]["derain"]
-    others = {str(each["packages"]["derain"]) for each in workers} - {str(here)}
+    others = {each["packages"]["derain"] or "none" for each in workers} - {here}
     if others:
         raise InputError(
             "--dask",
