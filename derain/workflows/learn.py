@@ -66,18 +66,19 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
         )
     student = student_of(config, source)
     require_writable(config.out)
-    _clear(config.work)
     keep_freed_memory()
-    show(f"{len(source):,} scans to learn from. Everything but the model goes to {config.work}/")
-    if student.blind and not config.blind and student.start is None:
-        show("The scans have no intensities: the network is trained without them.")
-    steps = Steps(show, LEARN_STEPS)
     with recorded_warnings() as warnings:
         teacher = over_recording(load_method(*named_method(config.teacher)))
         found = named_frames(
             config.recordings, config.columns, labelled=True, recordings=True, topic=config.topic
         )
         recording = with_poses(found, config.poses)
+        _clear(config.work)  # after all that may be mistyped is read
+        scans = f"{len(source):,} scans to learn from"
+        show(f"{scans}. Everything but the model goes to {config.work}/")
+        if student.blind and not config.blind and student.start is None:
+            show("The scans have no intensities: the network is trained without them.")
+        steps = Steps(show, LEARN_STEPS)
         taught = _teach(config, teacher, recording, steps, warnings)
         data = Taught(str(config.taught))
         # Scans suit persistence, another teacher, where this one sees several at a time.

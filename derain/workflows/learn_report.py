@@ -53,7 +53,7 @@ class LearnResults:
         student: Name of the network, and what it sees.
         model: The ONNX file.
         path: File of the report.
-        taught: The teacher's answers of all scans.
+        taught: The teacher's answers of all scans, also of those that it left out.
         trained_on: Number of scans that the student learns from.
         held_out: Number of scans that are held out.
         agreement: The student's answers beside the teacher's on held-out scans; of no point before

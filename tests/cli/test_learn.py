@@ -115,16 +115,22 @@ def test_a_folder_of_something_else_is_not_cleared(refused, recording) -> None:
         (2, (), "2 scans: too few for training and validation"),
         (3, ("--teacher", "nobody"), "derain: nobody: no such method or file"),
         (3, ("--poses", "none.txt", "--teacher", "dror"), "none.txt"),
+        (3, ("--poses", "odometry", "--teacher", "dror"), "--poses: odometry is no file"),
     ],
 )
-def test_what_cannot_be_learnt_from_is_refused_and_leaves_no_model(
+def test_what_cannot_be_learnt_from_is_refused_and_leaves_no_model_and_what_was_learnt_before(
     run_derain, recording, scans, options, names
 ) -> None:
     paths = sorted(recording.iterdir())[:scans]
+    of_earlier_run = Path("model_learning/report.md")
+    of_earlier_run.parent.mkdir()
+    of_earlier_run.touch()
+    (of_earlier_run.parent / learn.MARK).touch()
     outcome = run_derain("learn", *paths, "--out", "model.onnx", *options)
     assert outcome.code == 2
     assert names in outcome.err
     assert not Path("model.onnx").exists()
+    assert of_earlier_run.exists()
 
 
 def test_a_recording_of_which_too_few_scans_can_be_labelled_is_refused_with_the_reason(
