@@ -32,9 +32,8 @@ class Between(Method):
         poses: Poses of the scans that it has judged, with those around them.
     """
 
-    def __init__(self, dimmer: Dimmer = Dimmer(), threads: int = 0) -> None:
+    def __init__(self, dimmer: Dimmer = Dimmer()) -> None:
         self.dimmer = dimmer
-        self.threads = threads
         self.poses: list[Any] = []
         self._recent = RecentFrames(self.window)
 
