@@ -28,8 +28,6 @@ class Format(ABC):
 
     Attributes:
         HELP: Description, for ``derain info --formats``.
-        UNNAMED: Those of its files that do not name their columns, for the help of ``--columns``;
-            empty if every file does.
         DAMAGE: Exceptions of :meth:`decode`, besides InputError, on content that it cannot read.
         EXTRA: Extra that must be installed for it, if any.
         RECORD: Likelihood that such a file is a record of something else, such as of poses:
@@ -37,7 +35,6 @@ class Format(ABC):
     """
 
     HELP: ClassVar[str] = ""
-    UNNAMED: ClassVar[str] = ""
     DAMAGE: ClassVar[tuple[type[Exception], ...]] = (ValueError,)
     EXTRA: ClassVar[Extra | None] = None
     RECORD: ClassVar[int] = 0

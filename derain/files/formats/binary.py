@@ -40,7 +40,6 @@ class Binary(Format):
     """Rows of numbers, little-endian and row-major, without a header."""
 
     HELP = "rows of float32 or float64 without a header: KITTI and many others"
-    UNNAMED = ".bin"
 
     def decode(self, content: Content, columns: Sequence[str]) -> Scan:
         """Reads rows of numbers.

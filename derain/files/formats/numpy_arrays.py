@@ -57,7 +57,6 @@ class Npy(Format):
     """One array of NumPy's."""
 
     HELP = "one NumPy array"
-    UNNAMED = ".npy"
     DAMAGE = (Exception,)  # NumPy parses an array's header as Python code
 
     def decode(self, content: Content, columns: Sequence[str]) -> Scan:
@@ -94,7 +93,6 @@ class Npz(Format):
     """Several arrays of NumPy's, each under its name."""
 
     HELP = "several NumPy arrays, by name"
-    UNNAMED = ".npz of one array"
     DAMAGE = (Exception,)
 
     def decode(self, content: Content, columns: Sequence[str]) -> Scan:

@@ -86,7 +86,6 @@ class Table(Format):
     """Lines of numbers, perhaps under a line of names."""
 
     HELP = "lines of numbers, optionally after a line of names"
-    UNNAMED = "text without a line of names"
     DAMAGE = (ValueError, csv.Error)
 
     def decode(self, content: Content, columns: Sequence[str]) -> Scan:
