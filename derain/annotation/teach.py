@@ -196,8 +196,9 @@ def teach(
     work = Labelling(method, method.fingerprint(), out.absolute(), card)
     unfinished = Manifest(method.as_dict(), finished=False)
     if division is None or not division.keeps_records(source, out):
+        if is_taught(out):
+            documents_at(work.out, FOLDER).remove_all()  # records of labels that are replaced now
         unfinished.write(out)
-        documents_at(work.out, FOLDER).remove_all()  # of labels that are replaced now
         frames = _known(work.do(whole(source)), len(source), guard, watch)
         return _finish(work, out, frames)
     options = work.options("teach", source, division.block)
