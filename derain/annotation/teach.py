@@ -125,7 +125,7 @@ class Labelling(UnitJudging[LabelledScan]):
         truth = written["truth"]
         return LabelledScan(
             replace(unit.by_key[written["key"]], number=written["number"]),
-            Answers(np.array(written["answers"], np.int64)),
+            Answers(np.array(written["answers"], np.int64).reshape(Answers().table.shape)),
             written["milliseconds"],
             None if truth is None else [np.array(cells, np.int64) for cells in truth],
         )

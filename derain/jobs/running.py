@@ -9,6 +9,7 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -75,7 +76,11 @@ class Work(ABC, Generic[UnitT, ResultT]):
 
     @abstractmethod
     def from_json(self, unit: UnitT, written: Any) -> ResultT:
-        """A result from its record."""
+        """A result from its record.
+
+        Raises:
+            LookupError, TypeError, ValueError: The record is of another version.
+        """
 
     def look(self) -> IsThere[UnitT, ResultT]:
         """Checks the written results; work that writes nothing is always complete."""
@@ -171,7 +176,8 @@ class Task(Generic[UnitT, ResultT]):
         for unit, record in self.job.records_of(units):
             results = None
             if record is not None and not record.errors:
-                results = [self.work.from_json(unit, written) for written in record.results]
+                with suppress(LookupError, TypeError, ValueError):  # of another version: done again
+                    results = [self.work.from_json(unit, written) for written in record.results]
             yield unit, results if results is not None and is_there(unit, results) else None
 
     def do(self, unit: UnitT) -> Iterator[ResultT]:
