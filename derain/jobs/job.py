@@ -77,7 +77,7 @@ class Job:
             raise InputError(
                 without_secrets(str(folder)),
                 f"was started with other options: {changed}",
-                "Give --out another folder, or --anew to do all of it again.",
+                "Give --out another folder, or do all of it again, by --anew where there is one.",
             )
         listed = [[unit.id, unit.size, unit.inputs] for unit in units]
         documents.write(UNITS, json.dumps(listed))
