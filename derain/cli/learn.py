@@ -102,10 +102,10 @@ def main(arguments: argparse.Namespace) -> int:
         start=arguments.start,
     )
     results = learn(config, print_lines)
-    if arguments.rerun is not None:
-        _write_playback(config, arguments.rerun)
     print_lines(f"\n{results}\n\nReport: {results.path}")
     print_lines(f"Clean other scans: derain run {results.model} SCANS --out cleaned")
+    if arguments.rerun is not None:
+        _write_playback(config, arguments.rerun)
     return 0
 
 
