@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from derain.workflows.progress import EpochLines
 from derain.workflows.training import checkpoint_of_run, quiet_lightning, run_trainer
 
@@ -80,6 +82,13 @@ def fit_options(config: str | Path | None, settings: Mapping[str, Any]) -> list[
     """
     words = [] if config is None else ["--config", str(config)]
     for name, value in settings.items():
-        text = str(value) if isinstance(value, str | Path) else json.dumps(value)
+        text = str(value) if isinstance(value, str | Path) else json.dumps(value, default=_listed)
         words += [f"--{name}", text]
     return words
+
+
+def _listed(value: Any) -> Any:
+    """A number or an array of NumPy as JSON takes it."""
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    raise TypeError(f"a setting cannot be of type {type(value).__name__}")

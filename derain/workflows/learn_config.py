@@ -36,7 +36,7 @@ class LearnConfig:
         ('model_learning', 'default')
 
     Attributes:
-        recordings: Folders of consecutive scans, or bags.
+        recordings: Folders of consecutive scans, or bags; one or several, as paths or texts.
         out: The ONNX file.
         folder: Folder of everything else; None for ``<out>_learning`` beside the model. A second
             run clears it.
@@ -53,7 +53,7 @@ class LearnConfig:
         topic: Topic of the bags; None where each has only one of clouds.
 
     Raises:
-        InputError: No epoch.
+        InputError: No recording, or no epoch.
     """
 
     recordings: Sequence[Path]
@@ -69,6 +69,15 @@ class LearnConfig:
     topic: str | None = None
 
     def __post_init__(self) -> None:
+        given = self.recordings
+        # One path is no sequence of letters, and an iterator would be at its end the second time.
+        recordings = (given,) if isinstance(given, str | Path) else tuple(given)
+        if not recordings:
+            raise InputError("recordings", "there are none", "Give one or more.")
+        object.__setattr__(self, "recordings", recordings)
+        object.__setattr__(self, "out", Path(self.out))
+        if self.folder is not None:
+            object.__setattr__(self, "folder", Path(self.folder))
         if self.epochs is not None and self.epochs < 1:
             raise InputError("epochs", f"{self.epochs} is too few", "Give 1 or more.")
 

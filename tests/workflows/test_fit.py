@@ -21,6 +21,12 @@ def test_settings_are_options_of_the_command() -> None:
     )
 
 
+def test_settings_may_be_numbers_and_arrays_of_numpy() -> None:
+    settings = {"trainer.max_epochs": np.int64(2), "model.milestones": np.array([1, 2])}
+    words = fit_options(None, settings)
+    assert words == ["--trainer.max_epochs", "2", "--model.milestones", "[1, 2]"]
+
+
 @pytest.fixture
 def settings(tmp_path, one_block) -> dict[str, object]:
     """Settings for one epoch of a data set in the layout of WADS, of two sequences."""

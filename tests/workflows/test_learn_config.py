@@ -125,6 +125,18 @@ def test_what_does_not_go_with_a_start_is_refused(
         student_of(config(tmp_path / "scans", start=start, **options), scans)
 
 
+@pytest.mark.parametrize("recordings", ["drive", ["drive"], iter(["drive"])])
+def test_paths_may_be_texts_and_one_recording_may_stand_alone(recordings) -> None:
+    found = LearnConfig(recordings, "model.onnx", folder="work")
+    assert [str(recording) for recording in found.recordings] == ["drive"]
+    assert found.checkpoint == Path("work/student.ckpt")
+
+
+def test_no_recording_is_refused() -> None:
+    with pytest.raises(InputError, match="recordings"):
+        LearnConfig([], Path("model.onnx"))
+
+
 def test_a_training_without_an_epoch_is_refused() -> None:
     with pytest.raises(InputError, match="epochs"):
         LearnConfig([Path("drive")], Path("model.onnx"), epochs=0)
