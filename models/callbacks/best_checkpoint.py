@@ -36,11 +36,15 @@ class BestCheckpoint(ModelCheckpoint):
     def setup(self, trainer: lightning.Trainer, pl_module: Any, stage: str) -> None:
         """Takes the monitor's current name for the one in a configuration of an earlier version.
 
+        Where several epochs are kept, their names have their numbers.
+
         A training of fewer epochs than there are between two validations ends with one: without,
         nothing of it would be kept.
         """
         if self.monitor is not None:
             self.monitor = current_monitor(self.monitor)
+        if self.save_top_k not in (0, 1) and self.filename and "{" not in self.filename:
+            self.filename += "-{epoch}"  # each would overwrite the one before, however good
         epochs, between = trainer.max_epochs, trainer.check_val_every_n_epoch
         if epochs is not None and between is not None and 0 < epochs < between:
             trainer.check_val_every_n_epoch = epochs

@@ -111,6 +111,14 @@ def test_of_several_best_epochs_the_first_is_taken_over_and_none_is_lost(
     assert weights(tmp_path / "first").items() >= {"epoch=0.ckpt": 1, "epoch=1.ckpt": 2}.items()
 
 
+@pytest.mark.parametrize(("kept", "epochs"), [(2, {0, 2}), (-1, {0, 1, 2})])
+def test_several_best_epochs_have_a_name_each(fit, tmp_path, kept, epochs) -> None:
+    best = fit("first", 3, (4.0, 1.0, 3.0), mode="max", save_top_k=kept)
+    expected = {f"best-epoch={epoch}.ckpt": epoch + 1 for epoch in epochs}
+    assert weights(tmp_path / "first") == expected
+    assert Path(best.best_model_path).name == "best-epoch=0.ckpt"
+
+
 @pytest.mark.parametrize(
     ("named", "filename"),
     [
