@@ -152,10 +152,11 @@ def trials_of(storage: Path) -> list[tuple[dict[str, Any], list[float]]]:
     return [(trial.params, trial.values) for trial in complete]
 
 
-@pytest.mark.parametrize("ending", ["db", "journal"])
-@pytest.mark.parametrize("killed_at", [0, 3, 13])
+@pytest.mark.parametrize(
+    ("killed_at", "ending"), [(0, "journal"), (3, "journal"), (13, "journal"), (3, "db")]
+)
 def test_a_search_that_was_killed_goes_on_as_one_that_was_not(
-    seen, tmp_path, monkeypatch, ending, killed_at
+    seen, tmp_path, monkeypatch, killed_at, ending
 ) -> None:
     whole, broken = tmp_path / f"whole.{ending}", tmp_path / f"broken.{ending}"
     unbroken, _ = tune("dsor", seen, 16, whole)

@@ -107,7 +107,7 @@ def data() -> InMemory:
 
 @pytest.fixture(autouse=True)
 def _drawn_in_no_time(monkeypatch) -> None:
-    for name in ("errors_figure", "operating_points_figure"):
+    for name in ("comparison_figure", "errors_figure", "operating_points_figure"):
         monkeypatch.setattr(panels, name, lambda *_: Figure(figsize=(0.1, 0.1)))
 
 
