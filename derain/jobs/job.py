@@ -18,6 +18,9 @@ from derain.jobs.unit import Record, Unit
 from derain.stores.documents import Documents, documents_at
 from derain.stores.url import Place, without_secrets
 
+# Options of an earlier version may differ by the dozen.
+MOST_DIFFERENCES = 3
+
 FOLDER = ".derain"
 JOB, UNITS, RECORDS = "job.json", "units.json", "units"
 
@@ -232,18 +235,21 @@ def job_status(folder: Place, on_done: Callable[[Record], None]) -> JobStatus:
 
 
 def differences(begun: Mapping[str, Any], now: Mapping[str, Any]) -> str:
-    """Describes the options that differ from those at the start; empty if none does.
+    """Describes the first options that differ from those at the start; empty if none does.
 
     Args:
         begun: The options at the start.
         now: The options of this command.
     """
     names = [*begun, *(name for name in now if name not in begun)]
-    return ", ".join(
+    changes = [
         f"{name} was {begun.get(name, 'not there')} and is {now.get(name, 'not there')}"
         for name in names
         if begun.get(name) != now.get(name)
-    )
+    ]
+    if further := changes[MOST_DIFFERENCES:]:
+        changes = [*changes[:MOST_DIFFERENCES], f"and {len(further)} more"]
+    return ", ".join(changes)
 
 
 def _checksum(content: Any) -> str:

@@ -97,6 +97,8 @@ def test_other_options_are_refused_and_named(out) -> None:
         begun(out, size=4)
     with pytest.raises(InputError, match="colour was not there and is red"):
         begun(out, colour="red")
+    with pytest.raises(InputError, match="b was not there and is 2, and 1 more"):
+        begun(out, size=4, a=1, b=2, c=3)
     anew, _ = Job.begin(out, {**OPTIONS, "size": 4}, UNITS, anew=True)
     assert next(anew.records_of(UNITS)) == (UNITS[0], None)
 
