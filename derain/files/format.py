@@ -30,6 +30,7 @@ class Format(ABC):
         HELP: Description, for ``derain info --formats``.
         DAMAGE: Exceptions of :meth:`decode`, besides InputError, on content that it cannot read.
         EXTRA: Extra that must be installed for it, if any.
+        NAMES_COLUMNS: True if its files name their columns, so that a further one is understood.
         RECORD: Likelihood that such a file is a record of something else, such as of poses:
             of a folder's files those of the lowest number are its scans.
     """
@@ -37,6 +38,7 @@ class Format(ABC):
     HELP: ClassVar[str] = ""
     DAMAGE: ClassVar[tuple[type[Exception], ...]] = (ValueError,)
     EXTRA: ClassVar[Extra | None] = None
+    NAMES_COLUMNS: ClassVar[bool] = True
     RECORD: ClassVar[int] = 0
 
     @abstractmethod

@@ -12,8 +12,8 @@ from derain.errors import InputError
 from derain.files import write_scan
 from derain.files.atomic import require_writable_folder
 from derain.files.columns import with_column
+from derain.files.format import format_of
 from derain.files.labels import LABEL
-from derain.files.names import scan_suffix
 from derain.sources.bag_frame import BagFrame
 from derain.sources.cleaned_bags import RAIN_PROBABILITY, BagOptions, CleanedBags
 from derain.sources.file_frame import FileFrame
@@ -26,9 +26,6 @@ from derain.sources.stored_frame import StoredBag
 from derain.stores.mirror import uploaded
 from derain.stores.objects import stamps_at
 from derain.stores.url import Place, is_url, is_web, path_of, url_of, without_secrets
-
-# Files whose columns have no names: a further one would be taken for something else.
-NAMELESS = (".bin", ".npy")
 
 
 class CleanSink:
@@ -200,7 +197,7 @@ class CleanSink:
     def _refuse_nameless(self) -> None:
         """Refuses a file in which the column of probabilities would have no name."""
         for frame in self._source:
-            if frame.suffix and scan_suffix(Path(frame.name)) in NAMELESS:
+            if frame.suffix and not format_of(Path(frame.name)).NAMES_COLUMNS:
                 raise InputError(
                     frame.name,
                     f"the columns of such a file have no names, so none can be {RAIN_PROBABILITY}",

@@ -8,7 +8,7 @@ from pathlib import Path
 from derain.annotation.manifest import FEWEST_SCANS
 from derain.datamodules.taught import Taught
 from derain.errors import InputError, counted
-from derain.export.methods import load_method, named_method, over_recording
+from derain.export.methods import PERSISTENCE, load_method, named_method, over_recording
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.files.atomic import require_writable, write_text
@@ -22,7 +22,7 @@ from derain.system.memory import keep_freed_memory
 from derain.system.notices import recorded_warnings, warn
 from derain.workflows.evaluation import beside_persistence, evaluate_student
 from derain.workflows.fit import fit, fit_options
-from derain.workflows.learn_config import PERSISTENCE, LearnConfig, Student, student_of
+from derain.workflows.learn_config import LearnConfig, Student, student_of
 from derain.workflows.learn_report import LEAST_RAIN, LearnResults, write_report
 from derain.workflows.progress import Show, Steps, show_nothing
 from derain.workflows.teaching import TeachResults, teach_recordings

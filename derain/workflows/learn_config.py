@@ -17,8 +17,6 @@ from derain.sources.source import Source
 from derain.spec import Spec
 from derain.workflows.configurations import packaged_configs
 
-PERSISTENCE = "persistence"
-
 # Networks that learn from labels, and the beginning of their configurations' names.
 STUDENTS = ("outdet", "salsanext", "salsanext_lite", "cues")
 

@@ -40,6 +40,7 @@ class Binary(Format):
     """Rows of numbers, little-endian and row-major, without a header."""
 
     HELP = "rows of float32 or float64 without a header: KITTI and many others"
+    NAMES_COLUMNS = False
 
     def decode(self, content: Content, columns: Sequence[str]) -> Scan:
         """Reads rows of numbers.

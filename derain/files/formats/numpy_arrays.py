@@ -58,6 +58,7 @@ class Npy(Format):
 
     HELP = "one NumPy array"
     DAMAGE = (Exception,)  # NumPy parses an array's header as Python code
+    NAMES_COLUMNS = False
 
     def decode(self, content: Content, columns: Sequence[str]) -> Scan:
         """Reads one array of points.
