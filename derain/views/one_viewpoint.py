@@ -95,7 +95,8 @@ def viewpoint_issues(scan: Scan) -> Iterator[ScanIssue]:
     """
     rows = np.flatnonzero(scan.valid)
     if len(rows) < LEAST_VALID * len(scan) or len(rows) < FEWEST_RETURNS:
-        yield from [*_map_issue(scan)] or _almost_empty_issue(scan)
+        if len(scan):
+            yield _almost_empty_issue(scan)
         return
     sample = scan.xyz.take(rows[:: -(-len(rows) // SAMPLED)], axis=0).astype(np.float64)
     position, times = _commonest(sample)
@@ -103,32 +104,20 @@ def viewpoint_issues(scan: Scan) -> Iterator[ScanIssue]:
         yield _no_returns_issue(scan, position)
         others = sample[(sample != position).any(axis=1)]
         sample = others if len(others) else sample
-    misplaced = [*_off_centre_issue(sample)] or [*_unit_issue(sample)]
-    yield from misplaced
-    if not misplaced:
-        yield from [*_single_beam_issue(sample)] or _viewpoints_issue(scan)
+    issue = _off_centre_issue(sample) or _unit_issue(sample)
+    issue = issue or _single_beam_issue(sample) or _viewpoints_issue(scan)
+    if issue is not None:
+        yield issue
 
 
-def _almost_empty_issue(scan: Scan) -> Iterator[ScanIssue]:
-    """Yields an issue of a scan with few points that can be judged, unless it has no rows."""
-    if len(scan):
-        yield ScanIssue(
-            "almost empty",
-            f"{np.count_nonzero(scan.valid):,} of {len(scan):,} rows are points that can be "
-            "judged: too few to check the scan (is the sensor covered, or the file cut short?)",
-        )
-
-
-def _map_issue(scan: Scan) -> Iterator[ScanIssue]:
-    """Yields an issue if most of the rows are points too far off for any unit: those of a map."""
-    finite = np.isfinite(scan.xyz).all(axis=1)
-    beyond = (np.abs(scan.xyz[finite]) > LARGEST_COORDINATE).any(axis=1)
-    if 2 * beyond.sum() > len(scan):
-        yield ScanIssue(
-            "coordinates of a map",
-            f"{beyond.sum():,} points are more than {LARGEST_COORDINATE:,.0f} m away and cannot be "
-            "judged: subtract the sensor's position, as from coordinates of a map (UTM)",
-        )
+def _almost_empty_issue(scan: Scan) -> ScanIssue:
+    """The issue of a scan with few points that can be judged."""
+    return ScanIssue(
+        "almost empty",
+        f"{np.count_nonzero(scan.valid):,} of {len(scan):,} rows are points that can be judged: "
+        "too few to check the scan (is the sensor covered, or the file cut short? From coordinates "
+        "of a map, subtract the sensor's position)",
+    )
 
 
 def _commonest(sample: Floats) -> tuple[Floats, int]:
@@ -149,49 +138,43 @@ def _no_returns_issue(scan: Scan, position: Floats) -> ScanIssue:
     )
 
 
-def _off_centre_issue(sample: Floats) -> Iterator[ScanIssue]:
-    """Yields an issue if points, float64 (M, 3), lie together, far from the origin."""
+def _off_centre_issue(sample: Floats) -> ScanIssue | None:
+    """The issue of points, float64 (M, 3), that lie together, far from the origin."""
     centre = np.median(sample, axis=0)
     around = float(np.median(np.linalg.norm(sample - centre, axis=1)))
     away = float(np.linalg.norm(centre))
-    if away > OFF_CENTRE * around > 0:
-        yield ScanIssue(
-            "coordinates of a map",
-            f"the points lie about {away:,.0f} m from the origin, and half of them within "
-            f"{around:,.0f} m of one another: subtract the sensor's position, as from coordinates "
-            "of a map (UTM), because the sensor has to be the origin",
-        )
+    if not away > OFF_CENTRE * around > 0:
+        return None
+    return ScanIssue(
+        "coordinates of a map",
+        f"the points lie about {away:,.0f} m from the origin, and half of them within "
+        f"{around:,.0f} m of one another: subtract the sensor's position, as from coordinates "
+        "of a map (UTM), because the sensor has to be the origin",
+    )
 
 
-def _unit_issue(sample: Floats) -> Iterator[ScanIssue]:
-    """Yields an issue if points, float64 (M, 3), are farther off or nearer than in metres."""
+def _unit_issue(sample: Floats) -> ScanIssue | None:
+    """The issue of points, float64 (M, 3), that are farther off or nearer than in metres."""
     range_ = np.linalg.norm(sample, axis=1)
     far, near = np.percentile(range_, [FAR_PERCENTILE, 99])
     height = _height(sample)
+    all_near = f"all but one point in a hundred are within {near:.2g} m"
+    ground = f"the ground is {height:.2g} m below the sensor"
     if far > FAR_OFF:
-        yield ScanIssue(
-            "points farther off than sensors see",
-            f"one point in twenty is more than {far:,.0f} m away: coordinates have to be in "
-            "metres, as seen from the sensor (divide millimetres by 1,000, centimetres by 100)",
-        )
+        sign = f"one point in twenty is more than {far:,.0f} m away"
     elif near < NEAR_BY:
-        yield ScanIssue(
-            "points nearer than sensors see",
-            f"all but one point in a hundred are within {near:.2g} m: coordinates have to be in "
-            "metres, neither in kilometres nor scaled to a unit",
-        )
+        sign = all_near
     elif height < LOWEST_SENSOR and near < ROOM:
-        yield ScanIssue(
-            "ground nearer than below any vehicle's sensor",
-            f"the ground is {height:.2g} m below the sensor, and all but one point in a hundred "
-            f"are within {near:.2g} m: coordinates have to be in metres",
-        )
+        sign = f"{ground}, and {all_near}"
     elif height > HIGHEST_SENSOR:
-        yield ScanIssue(
-            "ground farther than below any vehicle's sensor",
-            f"the ground is {height:.2g} m below the sensor: coordinates have to be in metres "
-            "(multiply feet by 0.3048), unless the sensor is mounted above the road",
-        )
+        sign = f"{ground}, farther than below any vehicle's"
+    else:
+        return None
+    return ScanIssue(
+        "coordinates not in metres",
+        f"{sign}: coordinates have to be in metres, as seen from the sensor (divide millimetres "
+        "by 1,000, multiply feet by 0.3048)",
+    )
 
 
 def _height(sample: Floats) -> float:
@@ -203,23 +186,24 @@ def _height(sample: Floats) -> float:
     return -float(np.percentile(below, GROUND_PERCENTILE))
 
 
-def _single_beam_issue(sample: Floats) -> Iterator[ScanIssue]:
-    """Yields an issue if points, float64 (M, 3), are all of one plane or cone of rays."""
+def _single_beam_issue(sample: Floats) -> ScanIssue | None:
+    """The issue of points, float64 (M, 3), that are all of one plane or cone of rays."""
     rays = sample / np.linalg.norm(sample, axis=1, keepdims=True)
     lowest, highest = np.degrees(np.arcsin(np.percentile(rays[:, 2], [1, 99]).clip(-1, 1)))
     # Not a product of matrices, whose threads would take longer to wake than it takes.
     moments = np.einsum("ij,ik->jk", rays, rays) / len(rays)
     least = float(np.linalg.eigvalsh(moments)[0])
-    if least < OUT_OF_PLANE**2 or highest - lowest < OPENING:
-        yield ScanIssue(
-            "a single beam",
-            "all points are of one beam, as those of a planar scanner: models and filters are made "
-            "for sensors of many beams, and may remove solid points",
-        )
+    if least >= OUT_OF_PLANE**2 and highest - lowest >= OPENING:
+        return None
+    return ScanIssue(
+        "a single beam",
+        "all points are of one beam, as those of a planar scanner: models and filters are made "
+        "for sensors of many beams, and may remove solid points",
+    )
 
 
-def _viewpoints_issue(scan: Scan) -> Iterator[ScanIssue]:
-    """Yields an issue if points are denser, or surfaces more often torn, than in one scan."""
+def _viewpoints_issue(scan: Scan) -> ScanIssue | None:
+    """The issue of points that are denser, or surfaces more often torn, than in one scan."""
     rays = rays_near_axes(scan)
     crowding, step = crowding_far_off(rays), range_step(rays)
     if crowding > MORE_CROWDED:
@@ -227,8 +211,8 @@ def _viewpoints_issue(scan: Scan) -> Iterator[ScanIssue]:
     elif step > RANGE_STEP:
         reason = f"the range changes by {step:.1%} (median) between neighbouring rays of a beam"
     else:
-        return
-    yield ScanIssue(
+        return None
+    return ScanIssue(
         "points of several viewpoints",
         f"{reason}, which no sensor sees from one place: clean scans one by one, in the sensor's "
         "coordinates, before they are merged into a map",
