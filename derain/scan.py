@@ -249,9 +249,10 @@ class Scan:
             case "radar" if self.radar is not None:
                 return to_float32(self.radar)
         column = named(self.fields, name, self.name)
-        if column is None or column.ndim > 1 or column.dtype.kind not in "biuf":
+        values = None if column is None else flattened(column)
+        if values is None or values.ndim > 1 or values.dtype.kind not in "biuf":
             return None
-        values = to_float32(column)
+        values = to_float32(values)
         return np.where(np.abs(values) <= LARGEST_VALUE, values, np.float32(np.nan))
 
     def with_label(self, label: Array) -> "Scan":
@@ -344,6 +345,11 @@ def named(columns: Mapping[str, Named], name: str, subject: str | Path) -> Named
 def has_points_as_columns(rows: int, width: int) -> bool:
     """True if an array is so much wider than long that its points must be its columns."""
     return width > max(rows, WIDEST_ARRAY)
+
+
+def flattened(column: Array) -> Array:
+    """A column (N, 1) as (N,), any other as it is: files hold one value per point in both ways."""
+    return column.reshape(-1) if column.shape[1:] == (1,) else column
 
 
 def to_float32(array: Array) -> Float32s:

@@ -10,7 +10,7 @@ import numpy as np
 from derain.errors import InputError
 from derain.files.names import scan_suffix
 from derain.files.text import encode
-from derain.scan import Array, Float32s, Scan, named, to_float32
+from derain.scan import Array, Float32s, Scan, flattened, named, to_float32
 
 # Columns of a file by their names, N rows each.
 Columns = Mapping[str, Array]
@@ -94,10 +94,11 @@ def intensity_name(subject: str | Path, names: Iterable[str]) -> str | None:
 
 
 def _numbers(fields: Columns, *axes: int, kinds: str = "iuf") -> dict[str, Array]:
-    """The columns that hold numbers and have one of these numbers of axes."""
+    """The columns that hold numbers and have one of these numbers of axes, once flattened."""
+    columns = {name: flattened(column) for name, column in fields.items()}
     return {
         name: column
-        for name, column in fields.items()
+        for name, column in columns.items()
         if column.dtype.kind in kinds and column.ndim in axes
     }
 
@@ -144,8 +145,8 @@ def columns_of(scan: Scan) -> dict[str, Array]:
 
     Returns:
         Name → column of N rows: the columns of the scan's own file, or x, y, z (and intensity) of a
-        scan made in memory. Coordinates held in one `xyz` array come out as x, y and z, which every
-        format can hold.
+        scan made in memory. Coordinates held in one `xyz` array come out as x, y and z, and columns
+        (N, 1) as (N,), which every format can hold.
     """
     from_memory = {"xyz": scan.xyz, "intensity": scan.intensity}
     columns: dict[str, Array] = {}
@@ -153,7 +154,7 @@ def columns_of(scan: Scan) -> dict[str, Array]:
         if name == "xyz" and column is not None:
             columns |= {axis: column[:, place] for place, axis in enumerate("xyz")}
         elif column is not None:
-            columns[name] = column
+            columns[name] = flattened(column)
     return columns
 
 

@@ -3,7 +3,7 @@
 import io
 import math
 import zipfile
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,11 +26,9 @@ class NpyHeader:
 
     Attributes:
         structured: True if they are named fields, and not side by side without names.
-        as_columns: Names of the fields that the file holds as (N, 1).
     """
 
     structured: bool
-    as_columns: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -42,14 +40,12 @@ class NpzHeader:
         table: Name of the array that holds several columns, if there is one.
         columns: Their names.
         structured: True if they are named fields of that array.
-        as_columns: Names of the columns that the file holds as arrays (N, 1).
     """
 
     constants: Columns
     table: str | None = None
     columns: tuple[str, ...] = ()
     structured: bool = False
-    as_columns: frozenset[str] = frozenset()
 
 
 @FORMATS.add(".npy")
@@ -74,8 +70,7 @@ class Npy(Format):
         array = _array(content.data)
         shape = _organised(content.path, _grid_of_table(array))
         fields = _columns_of_table(content.path, array, columns)
-        header = NpyHeader(bool(array.dtype.names), _fields_as_columns(array))
-        return scan_of(content.path, fields, shape, header)
+        return scan_of(content.path, fields, shape, NpyHeader(bool(array.dtype.names)))
 
     def encode(self, path: Path, scan: Scan) -> bytes:
         """A scan's columns as one array.
@@ -84,8 +79,7 @@ class Npy(Format):
         columns of several become a structured array. Organised clouds stay organised.
         """
         if isinstance(scan.header, NpyHeader) and scan.header.structured:
-            columns = _as_in_file(scan.fields, scan.header.as_columns)
-            return _to_bytes(_gridded(scan, _table(columns, structured=True)))
+            return _to_bytes(_gridded(scan, _table(scan.fields, structured=True)))
         return _to_bytes(_gridded(scan, _table(columns_of(scan), structured=False)))
 
 
@@ -103,9 +97,9 @@ class Npz(Format):
             content: The file. Coordinates are `xyz` (N, 3) or `x`, `y` and `z` (N,); in an
                 organised cloud `xyz` (H, W, 3) or `x`, `y` and `z` (H, W). Without them, `points`
                 or the only array is a table as in a .npy. Every array that begins with the same
-                (N,) or (H, W) is a column of the scan, flattened row-major; an array (N, 1) is a
-                column (N,). An array (W,) in an organised cloud, such as a spinning sensor's
-                timestamps, is repeated for each of the H rows.
+                (N,) or (H, W) is a column of the scan, flattened row-major. An array (W,) in an
+                organised cloud, such as a spinning sensor's timestamps, is repeated for each of the
+                H rows.
             columns: Names of the columns of such a table, unless it is structured.
 
         Raises:
@@ -117,19 +111,14 @@ class Npz(Format):
         grid = _grid(path, arrays) if table is None else _grid_of_table(arrays[table])
         shape = _organised(path, grid)
         fields, constants, structured = dict[str, Array](), {}, False
-        as_columns = set[str]()
         if table is not None:
             structured = bool(arrays[table].dtype.names)
-            as_columns |= _fields_as_columns(arrays[table])
             fields = _columns_of_table(path, arrays.pop(table), columns)
         stated = tuple(fields)
         for name, array in arrays.items():
             if name in stated:
                 raise InputError(path, f"has an array {name} beside a column {name}", "Rename one.")
-            if array.shape == (*grid, 1):
-                as_columns.add(name)
-                fields[name] = array.reshape(-1)
-            elif array.shape[: len(grid)] == grid:
+            if array.shape[: len(grid)] == grid:
                 fields[name] = array.reshape(math.prod(grid), *array.shape[len(grid) :])
             elif shape and array.shape == shape[1:]:
                 content.budget.reserve(shape[0] * array.nbytes)
@@ -137,13 +126,13 @@ class Npz(Format):
             else:
                 constants[name] = array
         _refuse_other_points(path, grid, fields, constants)
-        header = NpzHeader(constants, table, stated, structured, frozenset(as_columns))
+        header = NpzHeader(constants, table, stated, structured)
         return scan_of(path, fields, shape, header)
 
     def encode(self, path: Path, scan: Scan) -> bytes:
         """A scan's columns as named arrays, compressed. Organised clouds stay organised."""
         header = scan.header if isinstance(scan.header, NpzHeader) else NpzHeader({})
-        columns = _as_in_file(scan.fields or columns_of(scan), header.as_columns)
+        columns = dict(scan.fields or columns_of(scan))
         arrays: dict[str, Array] = {}
         if header.table is not None and columns.keys() >= set(header.columns):
             table = {name: columns.pop(name) for name in header.columns}
@@ -198,20 +187,6 @@ def _arrays(content: Content) -> dict[str, Array]:
     return arrays
 
 
-def _fields_as_columns(array: Array) -> frozenset[str]:
-    """Names of the fields of a structured array that have the shape (1,)."""
-    names = array.dtype.names or ()
-    return frozenset(name for name in names if array.dtype[name].shape == (1,))
-
-
-def _as_in_file(columns: Columns, as_columns: Collection[str]) -> dict[str, Array]:
-    """Columns of a scan, those that the file holds as (N, 1) in that shape."""
-    return {
-        name: column[:, np.newaxis] if name in as_columns and column.ndim == 1 else column
-        for name, column in columns.items()
-    }
-
-
 def _table(columns: Columns, structured: bool) -> Array:
     """Columns as one array: numbers (N, C) if all are of one dtype, else structured (N,)."""
     dtypes = {column.dtype for column in columns.values()}
@@ -231,8 +206,7 @@ def _columns_of_table(path: Path, array: Array, columns: Sequence[str]) -> dict[
     """
     if names := array.dtype.names:
         flat = array.reshape(-1)
-        as_columns = _fields_as_columns(array)
-        return {name: flat[name][:, 0] if name in as_columns else flat[name] for name in names}
+        return {name: flat[name] for name in names}
     points = math.prod(array.shape[:-1])
     if has_points_as_columns(points, array.shape[-1]):
         remedy = "Write the array with a row for each point, such as its transpose."

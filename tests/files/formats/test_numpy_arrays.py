@@ -198,7 +198,8 @@ def test_a_column_that_stands_upright_is_read_and_written_as_it_was(
     tmp_path, coordinates, grid
 ) -> None:
     strength, path = np.arange(6, dtype=np.uint8), tmp_path / "scan.npz"
-    arrays = {**coordinates, "intensity": strength.reshape(*grid, 1)}
+    upright = strength.reshape(*grid, 1)
+    arrays = {**coordinates, "intensity": upright, "doppler": upright}
     np.savez(path, **arrays)
     scan = read_scan(path)
     np.testing.assert_array_equal(scan.xyz, XYZ)
@@ -209,6 +210,9 @@ def test_a_column_that_stands_upright_is_read_and_written_as_it_was(
             np.testing.assert_array_equal(copy[name], array, strict=True)
     write_scan(path, scan.take(strength > 2))
     assert np.load(path)["intensity"].tolist() == [[3], [4], [5]]
+    assert read_scan(path).channel("doppler").tolist() == [3, 4, 5]
+    write_scan(flat := tmp_path / "scan.pcd", scan)
+    np.testing.assert_array_equal(read_scan(flat).fields["doppler"], strength)
 
 
 @pytest.mark.parametrize("suffix", [".npy", ".bin", ".pcd", ".ply"])
