@@ -12,7 +12,6 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import chain, islice
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -32,13 +31,8 @@ _COMMENT = re.compile(r"\s*(#|//)")
 _CHUNK = 4096
 
 
-class Line(NamedTuple):
-    """A line of a text: its number, where it begins and ends, and its content."""
-
-    number: int
-    begin: int
-    end: int
-    text: str
+# Number of a line, from 1, and its content without the end of line.
+Line = tuple[int, bytes]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,22 +43,20 @@ class TableHeader:
         separator: Separator of the values of a line; None for white space.
         named: True if a line of the file names the columns.
         text: The whole file.
-        begin: Begin of its lines of points.
-        spans: Begin and end of each point's line in the text, in bytes, int64 (N, 2).
+        rows: Place of each point's line among those that are not empty, int64 (N,).
         columns: Name → numbers of these lines, (N,).
     """
 
     separator: str | None
     named: bool
     text: bytes
-    begin: int
-    spans: Ints
+    rows: Ints
     columns: Columns
 
     def take(self, rows: Array) -> "TableHeader":
         """The table of some of the points only."""
         columns = {name: column[rows] for name, column in self.columns.items()}
-        return replace(self, spans=self.spans[rows], columns=columns)
+        return replace(self, rows=self.rows[rows], columns=columns)
 
     def holds(self, columns: Columns) -> bool:
         """True if the lines hold just these columns, with these numbers."""
@@ -76,9 +68,9 @@ class TableHeader:
     def lines(self) -> bytes:
         """The line of names, if there is one, and the lines of the points, as they were written."""
         newline = b"\r\n" if b"\r\n" in self.text else b"\n"
-        names = [self.text[: self.begin]] if self.named else []
-        points = (self.text[begin:end] for begin, end in self.spans.tolist())
-        return b"".join(line + newline for line in (*names, *points))
+        lines = [line for _, line in _filled_lines(self.text)]
+        rows = [*range(self.named), *self.rows.tolist()]
+        return b"".join(lines[row] + newline for row in rows)
 
 
 @FORMATS.add(".asc", ".xyz")
@@ -179,41 +171,37 @@ def _parse_table(text: bytes) -> TableHeader:
         csv.Error: Quotes that do not match.
     """
     lines = _filled_lines(text)
-    first = next(lines, None)
-    if first is None:
-        return TableHeader(",", False, text, 0, np.empty((0, 2), np.int64), {})
-    separator = next((each for each in ",;" if each in first.text), None)
-    (values,) = _rows([_COMMENT.sub("", first.text)], separator)
+    number, line = next(lines, (0, None))
+    if line is None:
+        return TableHeader(",", False, text, np.empty(0, np.int64), {})
+    first = decode(line.removeprefix(_BYTE_ORDER_MARK))
+    separator = next((each for each in ",;" if each in first), None)
+    (values,) = _rows([_COMMENT.sub("", first)], separator)
     check_columns(len(values))
     named = not all(map(_is_number, values))
     if named:
         titles = [name.strip() for name in values]
         if len(set(titles)) < len(titles):
-            raise ValueError(f"line {first.number} names two columns alike: {', '.join(titles)}")
+            raise ValueError(f"line {number} names two columns alike: {', '.join(titles)}")
     else:
-        titles = [f"column {number}" for number, _ in enumerate(values, 1)]
-        lines = chain([first], lines)
-    numbers, spans = _parse_lines(lines, separator, titles)
-    columns = dict(zip(titles, numbers, strict=True))
-    return TableHeader(separator, named, text, first.end if named else 0, spans, columns)
+        titles = [f"column {place}" for place, _ in enumerate(values, 1)]
+        lines = chain([(number, encode(first))], lines)
+    numbers = _parse_lines(lines, separator, titles)
+    rows = np.arange(len(numbers[0])) + named
+    return TableHeader(separator, named, text, rows, dict(zip(titles, numbers, strict=True)))
 
 
 def _filled_lines(text: bytes) -> Iterator[Line]:
     """The lines of a text that are not empty."""
-    end = len(_BYTE_ORDER_MARK) if text.startswith(_BYTE_ORDER_MARK) else 0
-    file = io.BytesIO(text)
-    file.seek(end)
-    for number, line in enumerate(file, 1):
-        begin, end = end, end + len(line)
-        if line.strip():
-            line = line.rstrip(b"\r\n")
-            yield Line(number, begin, begin + len(line), decode(line))
+    for number, line in enumerate(io.BytesIO(text), 1):
+        if line.strip() not in (b"", _BYTE_ORDER_MARK):
+            yield number, line.rstrip(b"\r\n")
 
 
 def _parse_lines(
     lines: Iterator[Line], separator: str | None, titles: Sequence[str]
-) -> tuple[list[Array], Ints]:
-    """The columns of lines, and their spans as in TableHeader.
+) -> list[Array]:
+    """The columns of lines.
 
     Args:
         lines: The lines.
@@ -225,25 +213,22 @@ def _parse_lines(
         csv.Error: Quotes that do not match.
     """
     columns: list[list[Array]] = [[] for _ in titles]
-    spans = [np.empty((0, 2), np.int64)]
     while chunk := list(islice(lines, _CHUNK)):
-        rows = list(_rows((line.text for line in chunk), separator))
+        numbers, texts = zip(*chunk, strict=True)
+        rows = list(_rows(map(decode, texts), separator))
         if len(rows) < len(chunk):
-            raise ValueError(f"after line {chunk[0].number}, quotes run over several lines")
-        for line, row in zip(chunk, rows, strict=True):
+            raise ValueError(f"after line {numbers[0]}, quotes run over several lines")
+        for number, row in zip(numbers, rows, strict=True):
             if len(row) != len(titles):
-                raise ValueError(
-                    f"line {line.number} has {len(row)} values for {len(titles)} columns"
-                )
-        for title, column, texts in zip(titles, columns, zip(*rows, strict=True), strict=True):
+                raise ValueError(f"line {number} has {len(row)} values for {len(titles)} columns")
+        for title, column, values in zip(titles, columns, zip(*rows, strict=True), strict=True):
             try:
-                column.append(_numbers(texts))
+                column.append(_numbers(values))
             except ValueError:
-                odd = next(place for place, text in enumerate(texts) if not _is_number(text))
-                reason = f"line {chunk[odd].number}: {title} is '{texts[odd]}', not a number"
+                odd = next(place for place, value in enumerate(values) if not _is_number(value))
+                reason = f"line {numbers[odd]}: {title} is '{values[odd]}', not a number"
                 raise ValueError(reason) from None
-        spans.append(np.array([(line.begin, line.end) for line in chunk]))
-    return [_joined(column) for column in columns], np.concatenate(spans)
+    return [_joined(column) for column in columns]
 
 
 def _numbers(texts: Sequence[str]) -> Array:
