@@ -39,33 +39,19 @@ _END = re.compile(rb"^end_header[ \t]*\r?\n", re.MULTILINE)
 
 
 @dataclass(frozen=True)
-class Property:
-    """A column of an element.
+class Element:
+    """A table of the file.
 
     Attributes:
         name: Its name.
-        kind: Type of its values, in NumPy's spelling.
-        is_list: True if a row has a list of them, which only elements behind the vertices may have.
+        count: Number of its rows.
+        properties: Name and type of its columns, in NumPy's spelling; None for a list, which only
+            elements behind the vertices may have.
     """
 
     name: str
-    kind: str
-    is_list: bool = False
-
-    def __str__(self) -> str:
-        return f"property {PROPERTY_TYPES[self.kind]} {self.name}"
-
-
-@dataclass(frozen=True)
-class Element:
-    """A table of the file: its name, its number of rows and its properties."""
-
-    name: str
     count: int
-    properties: list[Property]
-
-    def __str__(self) -> str:
-        return "\n".join((f"element {self.name} {self.count}", *map(str, self.properties)))
+    properties: list[tuple[str, str | None]]
 
     def size(self, encoding: str) -> int:
         """Number of lines of text (ascii) or bytes (binary) of an element without lists."""
@@ -80,11 +66,10 @@ class Element:
         Raises:
             ValueError: There is a list.
         """
+        if any(kind is None for _, kind in self.properties):
+            raise ValueError(f"a property of {self.name} is a list")
         order = BYTE_ORDERS[encoding]
-        for each in self.properties:
-            if each.is_list:
-                raise ValueError(f"the property {each.name} of {self.name} is a list")
-        return np.dtype([(each.name, order + each.kind) for each in self.properties])
+        return np.dtype([(name, f"{order}{kind}") for name, kind in self.properties])
 
 
 @dataclass(frozen=True)
@@ -136,14 +121,15 @@ class Ply(Format):
             if column.ndim > 1:
                 raise no_place(path, name, column, "Write .pcd or .npz.")
         header = scan.header if isinstance(scan.header, PlyHeader) else PlyHeader()
-        properties = [Property(name, column.dtype.str[1:]) for name, column in columns.items()]
-        vertex = Element("vertex", len(scan), properties)
+        kinds = {name: column.dtype.str[1:] for name, column in columns.items()}
+        vertex = Element("vertex", len(scan), [*kinds.items()])
         table = records(columns, vertex.row(header.encoding))
         lines = (
             "ply",
             f"format {header.encoding} 1.0",
             *header.comments,
-            str(vertex),
+            f"element vertex {len(scan)}",
+            *(f"property {PROPERTY_TYPES[kind]} {name}" for name, kind in kinds.items()),
             "end_header",
         )
         rows = format_rows(table) if header.encoding == "ascii" else table.tobytes()
@@ -189,12 +175,9 @@ def _parse_header(content: bytes) -> tuple[str, tuple[str, ...], list[Element], 
             case ["element", name, count] if count.isdecimal():
                 elements.append(Element(name, int(count), []))
             case ["property", kind, name] if kind in _KINDS and elements:
-                elements[-1].properties.append(Property(name, _KINDS[kind]))
-            case ["property", "list", length, kind, name] if {
-                length,
-                kind,
-            } <= _KINDS.keys() and elements:
-                elements[-1].properties.append(Property(name, _KINDS[kind], is_list=True))
+                elements[-1].properties.append((name, _KINDS[kind]))
+            case ["property", "list", _, _, name] if elements:
+                elements[-1].properties.append((name, None))
             case _:
                 raise ValueError(f"'{line}' in the header")
     if not encoding:
