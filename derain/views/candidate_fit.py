@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,6 +20,9 @@ WORTH = 0.05
 
 # The tail of the rain is read from the ten outermost points: of fewer it has none.
 FEWEST = 10
+
+# Signs of values in which those of rain lie low, by the side that is bounded.
+SIGNS = {"least": -1, "most": 1}
 
 # Bounds are rounded outwards to this many digits, so that they can be read.
 DIGITS = 3
@@ -57,16 +59,18 @@ def fit_candidates(
     if not rain.any():
         return None
     outside = 1 - inside
-    every = [
-        _Side(name, is_most, of_channel if is_most else -of_channel, rain)
+    # Each side of each channel, seen so that rain is what lies low.
+    sides = {
+        (name, end): sign * of_channel
         for name, of_channel in zip(names, values, strict=True)
-        for is_most in (False, True)
-    ]
-    sides = [side for side in every if side.leaves_out(side.limit(outside)).mean() >= WORTH]
-    limits = {side: side.limit(outside / len(sides)) for side in sides}
+        for end, sign in SIGNS.items()
+    }
+    beyond = {side: _above(_limit(low[rain], outside), low).mean() for side, low in sides.items()}
+    sides = {side: low for side, low in sides.items() if beyond[side] >= WORTH}
+    limits = {side: _limit(low[rain], outside / len(sides)) for side, low in sides.items()}
     candidate = np.ones(len(rain), bool)
     for side, limit in limits.items():
-        candidate &= ~side.leaves_out(limit)
+        candidate &= ~_above(limit, sides[side])
     if candidate.mean() > 1 - WORTH:
         return None
     return Candidates(
@@ -77,41 +81,25 @@ def fit_candidates(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Side:
-    """One side of a channel, seen so that rain is what lies low.
+def _limit(rain: Float32s, outside: float) -> float:
+    """The limit above which nothing is rain; infinite if too little rain has a value.
 
-    Attributes:
-        channel: Name of the channel.
-        is_most: True if it is that of large values.
-        values: Those of all points, of the other side with their sign changed, float32 (M,); NaN
-            where a point has none.
-        rain: True for points of rain, bool (M,).
+    Args:
+        rain: Values of points of rain, float32 (R,); NaN where a point has none.
+        outside: Share of the rain that may be above it, were there no margin.
     """
+    rain = rain[~np.isnan(rain)]
+    if len(rain) < FEWEST:
+        return math.inf
+    tail = max(outside, 1 / len(rain))
+    shares = [max(1 - 10 * tail, 0.5), 1 - tail]
+    before, edge = np.quantile(rain, shares, method="higher").astype(float)
+    return _rounded_up(edge + (edge - before) * (1 + math.log10(tail / outside)))
 
-    channel: str
-    is_most: bool
-    values: Float32s
-    rain: Bools
 
-    def limit(self, outside: float) -> float:
-        """The limit above which nothing is rain; infinite if too little rain has a value.
-
-        Args:
-            outside: Share of the rain that may be above it, were there no margin.
-        """
-        rain = self.values[self.rain]
-        rain = rain[~np.isnan(rain)]
-        if len(rain) < FEWEST:
-            return math.inf
-        tail = max(outside, 1 / len(rain))
-        shares = [max(1 - 10 * tail, 0.5), 1 - tail]
-        before, edge = np.quantile(rain, shares, method="higher").astype(float)
-        return _rounded_up(edge + (edge - before) * (1 + math.log10(tail / outside)))
-
-    def leaves_out(self, limit: float) -> Bools:
-        """True for points above a limit, bool (M,)."""
-        return self.values > np.float32(limit)
+def _above(limit: float, values: Float32s) -> Bools:
+    """True for values, float32 (M,), above a limit, bool (M,)."""
+    return values > np.float32(limit)
 
 
 def _gathered(
@@ -126,13 +114,12 @@ def _gathered(
     return np.concatenate(values, axis=1), np.concatenate(rain)
 
 
-def _bounds(limits: Mapping[_Side, float]) -> tuple[Bound, ...]:
-    """The limits as bounds, one for each channel that has any."""
+def _bounds(limits: Mapping[tuple[str, str], float]) -> tuple[Bound, ...]:
+    """The limits, by channel and side, as bounds, one for each channel that has any."""
     by_channel: dict[str, dict[str, float]] = {}
-    for side, limit in limits.items():
-        bound = {"most": limit} if side.is_most else {"least": -limit}
-        by_channel.setdefault(side.channel, {}).update(bound)
-    return tuple(Bound(channel, **bound) for channel, bound in by_channel.items())
+    for (channel, end), limit in limits.items():
+        by_channel.setdefault(channel, {})[end] = SIGNS[end] * limit
+    return tuple(Bound(channel, **ends) for channel, ends in by_channel.items())
 
 
 def _rounded_up(number: float) -> float:

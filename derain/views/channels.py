@@ -70,14 +70,7 @@ def filled_values(
     Returns:
         float32 (M, C), each channel in its own unit; finite where the stand-ins are.
     """
-    of_all = np.empty((len(scan), len(channels)), np.float32)
-    for number, name in enumerate(channels):
-        of_all[:, number] = _column(scan, name)
-    # All of a point at once: four times faster than channel by channel.
-    values = of_all.take(rows, axis=0)
-    for of_channel, name in zip(values.T, channels, strict=True):
-        of_channel[np.isnan(of_channel)] = fill_value.get(name, 0.0)
-    return values
+    return np.ascontiguousarray(channel_image(scan, rows, channels, fill_value).T)
 
 
 def channel_image(

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from derain.scan import LARGEST_COORDINATE, Bools, Floats, Scan
+from derain.scan import Bools, Floats, Scan
 from derain.views.morton import MOST_COPIES
 from derain.views.scan_issues import ScanIssue
 
