@@ -9,7 +9,7 @@ from typing import Any
 from derain.errors import InputError
 from derain.files.documents import Entry, shown
 from derain.scan import LARGEST_ID, Scan
-from derain.views.candidates import Candidates, bounded_channels, candidates_at
+from derain.views.candidates import Candidates, candidates_at
 from derain.views.channels import MOST_CHANNELS
 from derain.views.one_viewpoint import viewpoint_issues
 from derain.views.scan_issues import (
@@ -80,18 +80,15 @@ class Spec:
             source: The file it was found in, for messages.
 
         Raises:
-            InputError: A newer schema, or something that is not a Spec.
+            InputError: Something that is not a Spec, or one of a later derain.
         """
         entry = Entry("its Spec", "", content)
         try:
-            _refuse_newer(entry)
             spec = cls(**entry.record(_PARSERS, _REQUIRED))
             _refuse_contradictions(spec, entry)
             _view_of(entry.members()["view"], spec)
         except InputError as error:
             remedy = "Upgrade derain, or export it again."
-            if GONE in error.reason:
-                remedy = f"Train it again without {GONE}."
             raise InputError(source, f"{error.subject}: {error.reason}", remedy) from error
         return spec
 
@@ -148,15 +145,6 @@ def _view_of(entry: Entry, spec: Spec, threads: int = 0) -> View:
     return view if spec.candidates is None else view.with_candidates(spec.candidates)
 
 
-def _refuse_newer(entry: Entry) -> None:
-    """Refuses a Spec of a later layout, before anything else of it is read."""
-    schema = entry.members().get("schema")
-    if schema is not None and isinstance(schema.value, int) and schema.value > SCHEMA:
-        raise entry.fault(
-            f"schema {shown(schema.value)} is newer than this derain's {SCHEMA}", "Upgrade derain."
-        )
-
-
 def _refuse_contradictions(spec: Spec, entry: Entry) -> None:
     """Refuses values that are possible one by one, but not together."""
     if len({len(spec.channels), len(spec.units), len(spec.mean), len(spec.std)}) > 1:
@@ -164,11 +152,6 @@ def _refuse_contradictions(spec: Spec, entry: Entry) -> None:
     if not spec.channels or len(set(spec.channels)) < len(spec.channels):
         raise entry.fault(
             f"channels {shown(spec.channels)} are none, or not distinct", "Name them."
-        )
-    bounds = () if spec.candidates is None else spec.candidates.bounds
-    if not {bound.channel for bound in bounds} <= set(bounded_channels(spec.channels)):
-        raise entry.fault(
-            "its candidates have bounds of channels that it does not see", "Leave them out."
         )
     if not set(spec.rain) <= set(spec.classes):
         raise entry.fault(f"rain {shown(spec.rain)} is not of its classes", "Name ids of them.")
@@ -179,18 +162,8 @@ def _channels(entry: Entry) -> tuple[str, ...]:
         raise entry.fault(f"more than {MOST_CHANNELS} channels", "Name fewer.")
     channels = entry.texts()
     if GONE in channels:
-        raise entry.fault(f"the channel {GONE} is no longer computed", "Train it without.")
+        raise entry.fault(f"the channel {GONE} is gone: train it again without", "Leave it out.")
     return channels
-
-
-def _classes(entry: Entry) -> dict[int, str]:
-    return {_id(key, name): name.text() for key, name in entry.members().items()}
-
-
-def _id(key: str, entry: Entry) -> int:
-    if not (key.isascii() and key.isdigit() and len(key) <= 5 and int(key) <= LARGEST_ID):
-        raise entry.fault(f"{shown(key)} is not the id of a class", "Write a whole number.")
-    return int(key)
 
 
 # What reads each part of a Spec.
@@ -199,7 +172,7 @@ _PARSERS: dict[str, Callable[[Entry], Any]] = {
     "view": lambda entry: entry.each(lambda part: part.value),
     "mean": Entry.numbers,
     "std": lambda entry: entry.numbers(read=Entry.positive),
-    "classes": _classes,
+    "classes": lambda entry: entry.texts_by_number(LARGEST_ID),
     "rain": lambda entry: tuple(item.whole(0, LARGEST_ID) for item in entry.items()),
     "data": Entry.text,
     "licence": Entry.text,

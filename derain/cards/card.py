@@ -187,7 +187,7 @@ def load_card(name: str | Path) -> DataCard:
     channels = len(CHANNELS_OF_STATISTICS)
     parsers: dict[str, Callable[[Entry], Any]] = {
         "name": Entry.text,
-        "classes": _classes,
+        "classes": lambda entry: entry.texts_by_number(LARGEST_ID),
         "rain": _ids,
         "unknown": _ids,
         "licence": Entry.text,
@@ -222,10 +222,6 @@ def load_card(name: str | Path) -> DataCard:
                 "Name ids that are listed under classes.",
             )
     return card
-
-
-def _classes(entry: Entry) -> dict[int, str]:
-    return {id_: name.text() for id_, name in entry.numbered(0, LARGEST_ID).items()}
 
 
 def _ids(entry: Entry) -> tuple[int, ...]:

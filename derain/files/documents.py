@@ -165,14 +165,14 @@ class Entry:
         """Parses each value of a mapping; returns the results by key."""
         return {key: read(entry) for key, entry in self.members().items()}
 
-    def numbered(self, least: int, most: int) -> dict[int, "Entry"]:
-        """The values of a mapping by their keys, which must be whole numbers of this span."""
+    def texts_by_number(self, most: int) -> dict[int, str]:
+        """Texts by the keys of a mapping: whole numbers from 0 to ``most``, in JSON as texts."""
         if not isinstance(self.value, dict):
-            raise self.fault(f"{shown(self.value)} is not a mapping", "Write `0: value` pairs.")
+            raise self.fault(f"{shown(self.value)} is not a mapping", "Write `0: text` pairs.")
         return {
-            Entry(self.source, self.key, key).whole(least, most): Entry(
+            Entry(self.source, self.key, _as_number(key)).whole(0, most): Entry(
                 self.source, f"{self.key}.{shown(key)}", value
-            )
+            ).text()
             for key, value in self.value.items()
         }
 
@@ -295,6 +295,12 @@ def shown(value: Any) -> str:
 def short(text: str) -> str:
     """A text for a message, without quotes and shortened if it is long."""
     return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _as_number(key: Any) -> Any:
+    """The number that a key of JSON stands for; any other key as it is."""
+    is_number = isinstance(key, str) and len(key) <= 9 and key.isascii() and key.isdecimal()
+    return int(key) if is_number else key
 
 
 def _refuse_depth(value: Any, depth: int = 0) -> None:

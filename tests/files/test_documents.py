@@ -101,11 +101,14 @@ def test_a_number_with_an_exponent_is_one_with_and_without_a_point(text, value, 
 
 
 def test_a_mapping_may_have_numbers_for_keys() -> None:
-    entry = Entry("file", "classes", {0: "ground", 3: "rain"})
-    assert {id_: name.text() for id_, name in entry.numbered(0, 9).items()} == entry.value
-    for wrong in ([], {"0": "a"}, {10: "a"}, {True: "a"}, {1.0: "a"}, {None: "a"}, {16**5000: "a"}):
+    for keys in ((0, 3), ("0", "3")):  # of YAML and of JSON
+        entry = Entry("file", "classes", dict(zip(keys, ("ground", "rain"), strict=True)))
+        assert entry.texts_by_number(9) == {0: "ground", 3: "rain"}
+    for key in ("a", "-1", "9" * 5000, "²", 10, True, 1.0, None, 16**5000):
         with pytest.raises(InputError, match="file: classes: "):
-            Entry("file", "classes", wrong).numbered(0, 9)
+            Entry("file", "classes", {key: "a"}).texts_by_number(9)
+    with pytest.raises(InputError, match=r"file: classes: .* not a mapping"):
+        Entry("file", "classes", []).texts_by_number(9)
 
 
 def test_values_are_cut_in_messages() -> None:

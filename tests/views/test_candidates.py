@@ -1,7 +1,6 @@
 """Candidates are the points within all bounds, and are read back as they were written."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,10 +10,7 @@ from hypothesis import strategies as st
 from derain.errors import InputError
 from derain.files.documents import Entry
 from derain.scan import Scan
-from derain.spec import Spec
 from derain.views.candidates import Bound, Candidates, bounded_channels, candidates_at, narrower
-
-from ..test_spec import SPEC
 
 numbers = st.none() | st.floats(-50, 50, width=32)
 sides = (
@@ -102,22 +98,3 @@ def test_what_does_not_describe_candidates_is_refused(content, message) -> None:
 def test_candidates_are_bounded_by_range_and_height_and_what_the_network_sees() -> None:
     assert bounded_channels(("x", "y", "z", "intensity")) == ("range", "z", "intensity")
     assert bounded_channels(("range", "doppler")) == ("range", "z", "doppler")
-
-
-@pytest.mark.parametrize(("channel", "refused"), [("range", False), ("z", False), ("x", True)])
-def test_a_spec_refuses_candidates_bounded_by_what_its_network_does_not_see(
-    channel, refused
-) -> None:
-    spec = replace(
-        SPEC,
-        channels=("x",),
-        units=("m",),
-        mean=(0.0,),
-        std=(1.0,),
-        candidates=Candidates((Bound(channel, most=3.0),)),
-    )
-    if refused:
-        with pytest.raises(InputError, match="bounds of channels that it does not see"):
-            Spec.from_dict(spec.as_dict(), "model")
-    else:
-        assert Spec.from_dict(spec.as_dict(), "model") == spec

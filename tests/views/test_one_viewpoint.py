@@ -130,7 +130,7 @@ def test_points_far_from_the_origin_are_those_of_a_map(spinning, origin) -> None
 
 
 def test_points_beyond_all_sensors_are_nearly_none_and_perhaps_a_map(spinning) -> None:
-    (issue,) = viewpoint_issues(Scan.of(spinning + (400_000, 5_400_000, 200)))
+    (issue,) = viewpoint_issues(Scan.of(spinning + np.array([400_000, 5_400_000, 200])))
     assert issue.kind == "almost empty"
     assert "coordinates of a map" in issue.detail
 
