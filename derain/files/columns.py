@@ -111,28 +111,13 @@ def _coordinates(path: Path, fields: Columns) -> Float32s:
     flat = _numbers(fields, 1)
     axes = [column for axis in "xyz" if (column := named(flat, axis, path)) is not None]
     if len(axes) < 3:
-        _refuse_unusable(path, fields)
+        columns = ", ".join(f"{name} {_kind(column)}" for name, column in fields.items())
         raise InputError(
             path,
-            f"has no x, y and z among its columns ({', '.join(fields)})",
+            f"has no x, y and z of one number per point among its columns ({columns})",
             "Name the coordinates x, y and z; --columns names the columns of a file without names.",
         )
     return np.stack([to_float32(axis) for axis in axes], axis=1)
-
-
-def _refuse_unusable(path: Path, fields: Columns) -> None:
-    """Refuses coordinates that are there by their names, but not as numbers of each point."""
-    usable = _numbers(fields, 1)
-    columns = {name: named(fields, name, path) for name in ("xyz", *"xyz")}
-    unusable = [
-        f"{name} is {_kind(column)}"
-        for name, column in columns.items()
-        if column is not None and named(usable, name, path) is None
-    ]
-    if unusable:
-        reason = f"its coordinates are not one number per point: {', '.join(unusable)}"
-        remedy = "Give x, y and z as whole or real numbers, one of each per point."
-        raise InputError(path, reason, remedy)
 
 
 def _kind(column: Array) -> str:

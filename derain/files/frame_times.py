@@ -45,10 +45,7 @@ def read_frame_times(scans: Sequence[Path]) -> Floats:
             "Write one: a line frame,timestamp, then one for each scan, such as 000000,12.3.",
         )
     times: dict[str, float] = {}
-    for name, text in _lines(path):
-        if not name:
-            raise InputError(path, "has a line that names no scan", "Complete it or leave it out.")
-        time = _finite(path, text)
+    for name, time in _lines(path):
         if times.setdefault(_key(name), time) != time:
             raise InputError(path, f"gives {name} two times", "Leave one line for each scan.")
     for scan in scans:
@@ -57,7 +54,7 @@ def read_frame_times(scans: Sequence[Path]) -> Floats:
     return np.array([times[_key(scan.name)] for scan in scans])
 
 
-def _lines(path: Path) -> Iterator[list[str]]:
+def _lines(path: Path) -> Iterator[tuple[str, float]]:
     """The name and the time of a scan, line by line."""
     with reading(path, ValueError, csv.Error):
         text = read_bytes(path, LARGEST_METADATA).decode("utf-8-sig")
@@ -67,20 +64,13 @@ def _lines(path: Path) -> Iterator[list[str]]:
             reason = f"has no columns {' and '.join(FRAME_COLUMNS)} ({', '.join(present)})"
             raise InputError(path, reason, "Rename those of the scan's name and its time.")
         for line in lines:
-            yield [line[name] for name in FRAME_COLUMNS]
+            name, time = (line[column] for column in FRAME_COLUMNS)
+            if not (name and math.isfinite(float(time))):
+                raise ValueError(f"the line '{name},{time}' is not a scan and its time")
+            yield name, float(time)
 
 
 def _key(name: str) -> str:
     stem, dot, suffix = name.removesuffix(COMPRESSED).rpartition(".")
     # Digits after a point are no suffix: scans may be named by the time of the frame.
     return (stem if dot and not suffix.isdigit() else name).lstrip("0")
-
-
-def _finite(path: Path, text: str) -> float:
-    try:
-        time = float(text)
-    except ValueError:
-        time = math.nan
-    if not math.isfinite(time):
-        raise InputError(path, f"'{text}' is not a time", "Write seconds, as in 12.345.")
-    return time

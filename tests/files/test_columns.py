@@ -64,18 +64,18 @@ def test_a_column_that_a_format_cannot_hold_is_refused(
 @pytest.mark.parametrize("suffix", [".csv", ".ply", ".pcd", ".npz", ".feather"])
 def test_a_file_without_coordinates_is_refused(tmp_path, suffix) -> None:
     path = written(tmp_path / f"scan{suffix}", ("x", "y", "depth", "ring"))
-    with pytest.raises(InputError, match=r"no coordinates|no x, y and z .* \(x, y, depth, ring\)"):
+    with pytest.raises(InputError, match=r"no coordinates|no x, y and z .* \(x .*, depth .*\)"):
         read_scan(path)
 
 
 @pytest.mark.parametrize(
     ("columns", "kinds"),
     [
-        ({axis: np.zeros(5, np.complex64) for axis in "xyz"}, ["x is complex64", "z is complex64"]),
-        ({"x": np.zeros(5), "y": np.zeros(5), "Z": np.zeros(5, bool)}, ["z is bool"]),
+        ({axis: np.zeros(5, np.complex64) for axis in "xyz"}, ["x complex64", "z complex64"]),
+        ({"x": np.zeros(5), "y": np.zeros(5), "Z": np.zeros(5, bool)}, ["Z bool"]),
         ({"x": np.zeros(5), "y": np.zeros(5), "z": np.zeros((5, 3))}, ["float64", "(3,)"]),
         ({"xyz": np.zeros((5, 3), "U1")}, ["xyz", "U1"]),
-        ({"points": np.zeros((5, 3), "U1")}, ["x is <U1", "y is <U1", "z is <U1"]),
+        ({"points": np.zeros((5, 3), "U1")}, ["x <U1", "y <U1", "z <U1"]),
     ],
 )
 def test_coordinates_that_are_no_numbers_are_named_with_what_they_are(
@@ -85,7 +85,6 @@ def test_coordinates_that_are_no_numbers_are_named_with_what_they_are(
     with pytest.raises(InputError) as refused:
         read_scan(tmp_path / "scan.npz", ("x", "y", "z"))
     assert all(part in refused.value.reason for part in kinds)
-    assert "has no x, y and z" not in refused.value.reason
 
 
 def test_truth_values_tell_which_points_are_of_the_radar(tmp_path) -> None:
