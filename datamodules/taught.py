@@ -24,7 +24,7 @@ class Taught(ScanDataModule):
         >>> from derain.sources.folders import named_frames
         >>> from derain.annotation.teach import teach
         >>> scans = named_frames([Path("scan.bin")])
-        >>> manifest = teach(FilterDerainer(DROR()), scans, Path("taught"))
+        >>> results = teach(FilterDerainer(DROR()), scans, Path("taught"))
         >>> data = Taught("taught")
         >>> data.card.name, [frame.key for frame in data.frames("train")]
         ('scans taught by dror', ['scan'])

@@ -14,6 +14,7 @@ from tqdm import tqdm
 
 from derain.annotation.manifest import (
     CARD,
+    HELD_OUT_PART,
     LABELS,
     TAUGHT_MANIFEST,
     Manifest,
@@ -35,11 +36,13 @@ from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.judging import Guard, unguarded
 from derain.sources.method import Method
+from derain.sources.recordings import irregularities
 from derain.sources.sink import FolderSink, LabelSink
 from derain.sources.source import Source
 from derain.sources.unit_judging import UnitJudging
 from derain.sources.units import Division, FrameUnit, units_of, whole
 from derain.stores.documents import documents_at
+from derain.system.notices import Notices, warn
 from derain.system.stopwatch import Stopwatch
 from derain.views.scan_issues import ScanIssue, much_removed
 
@@ -148,6 +151,35 @@ class Labelling(UnitJudging[LabelledScan]):
         return labelled
 
 
+@dataclass
+class TeachResults:
+    """The labels of recordings, or of a shard of them.
+
+    Attributes:
+        manifest: The labelled scans, as written; not finished while other shards are to be done.
+        judged: Number of judged scans; those of which nothing is known have no labels.
+        answers: Counts of the labels by range.
+        record: Scores by the scans' own labels; None where there is no card.
+    """
+
+    manifest: Manifest
+    judged: int = 0
+    answers: Answers = field(default_factory=Answers)
+    record: TruthRecord | None = None
+
+    @property
+    def held_out(self) -> int:
+        """Number of labelled scans that are held out."""
+        return sum(scan.part == HELD_OUT_PART for scan in self.manifest.scans)
+
+    def add(self, scan: LabelledScan) -> None:
+        """Counts a judged scan."""
+        self.judged += 1
+        self.answers += scan.answers
+        if self.record is not None and scan.truth is not None:
+            self.record.add_cells(scan.truth)
+
+
 # Receives each labelled scan.
 Watch = Callable[[LabelledScan], None]
 
@@ -161,19 +193,20 @@ def teach(
     watch: Watch = lambda scan: None,
     division: Division | None = None,
     executor: Submits | None = None,
-) -> Manifest:
+) -> TeachResults:
     """Labels recordings: 0 is not rain, 1 rain, 255 not known.
 
     Labels of the scans never change the result. Scans of which nothing is known are left out: they
     neither train nor measure a student. Until every scan is judged, the manifest is marked as not
-    finished, and nobody can read it.
+    finished, and nobody can read it. Labels from which a network could learn little are warned of.
 
     Args:
         method: The teacher.
         source: Scans in files, in time order, one sequence after the other.
         out: Folder to write: a new one, or one of an earlier teaching. It gets the labels, their
             data card, and a manifest with the paths of the scans.
-        card: Data card of the scans, from which the new one takes licence and unit.
+        card: Data card of the scans, from which the new one takes licence and unit, and by which
+            the scans' own labels measure the teacher's.
         guard: Surrounds the error of each scan; a scan whose error it suppresses gets no labels.
         watch: Called for each scan as soon as it is judged, in order.
         division: Division of the scans into units. Where there are more scans than a block has,
@@ -182,9 +215,6 @@ def teach(
         executor: Does the units: an executor of :mod:`concurrent.futures` or the like, whose
             processes find all files by the same paths. None does them in this process.
 
-    Returns:
-        The manifest. It is not finished while other shards of the units are to be done.
-
     Raises:
         InputError: Scans that are in no files, or whose paths are not UTF-8; a folder that holds
             something else, or in which the scans' own labels are; a scan that cannot be read or
@@ -192,43 +222,67 @@ def teach(
             records of other options in the folder; an executor that has ended.
     """
     refuse_to_overwrite(out, source)
+    for sentence in irregularities(source, method.window):
+        warn(sentence)
     # Absolute, because other processes may work in another folder.
     work = Labelling(method, method.fingerprint(), out.absolute(), card)
-    unfinished = Manifest(method.as_dict(), finished=False)
+    record = None if card is None else TruthRecord(card)
+    results = TeachResults(Manifest(method.as_dict(), finished=False), record=record)
     if division is None or not division.keeps_records(source, out):
         if is_taught(out):
             documents_at(work.out, FOLDER).remove_all()  # records of labels that are replaced now
-        unfinished.write(out)
-        frames = _known(work.do(whole(source)), len(source), guard, watch)
-        return _finish(work, out, frames)
-    options = work.options("teach", source, division.block)
-    options["card"] = None if card is None else card.name
-    units = units_of(source, method, division.block)
-    job, shard = division.begin(work.out, options, units)
-    unfinished.write(out)
-    task = Task(job, work)
-    results = (result for _, result, _ in run(task, shard, executor))
-    frames = _known(results, sum(len(unit.frames) for unit in shard), guard, watch)
-    if division.shard is not None:
-        scans = completed(task, units)
-        if scans is None:
-            return unfinished
-        frames = [scan.frame for scan in scans if scan.is_known]
-    return _finish(work, out, frames)
+        results.manifest.write(out)
+        known = _known(work.do(whole(source)), len(source), guard, watch, results)
+    else:
+        options = work.options("teach", source, division.block)
+        options["card"] = None if card is None else card.name
+        units = units_of(source, method, division.block)
+        job, shard = division.begin(work.out, options, units)
+        results.manifest.write(out)
+        task = Task(job, work)
+        judged = (result for _, result, _ in run(task, shard, executor))
+        known = _known(judged, sum(len(unit.frames) for unit in shard), guard, watch, results)
+        if division.shard is not None:
+            scans = completed(task, units)
+            if scans is not None:
+                known = [scan.frame for scan in scans if scan.is_known]
+                results.manifest = _finish(work, out, known)
+            return results
+    results.manifest = _finish(work, out, known)
+    _warn_of_little(results)
+    return results
 
 
-def _known(scans: Iterator[LabelledScan], total: int, guard: Guard, watch: Watch) -> list[Frame]:
-    """The frames with known points, after all scans are labelled."""
+def _known(
+    scans: Iterator[LabelledScan], total: int, guard: Guard, watch: Watch, results: TeachResults
+) -> list[Frame]:
+    """The frames with known points, after all scans are labelled and counted."""
     frames: list[Frame] = []
+    notices = Notices()
     for scan in tqdm(scans, total=total, desc="teaching", unit="scan", disable=None):
         if scan.error is not None:
             with guard(scan.frame):
                 raise scan.error
-        else:
-            watch(scan)
-            if scan.is_known:
-                frames.append(scan.frame)
+            continue
+        results.add(scan)
+        notices.warn(scan.frame.name, scan.issues)
+        watch(scan)
+        if scan.is_known:
+            frames.append(scan.frame)
+    notices.warn_of_repeats()
     return frames
+
+
+def _warn_of_little(results: TeachResults) -> None:
+    if unlabelled := results.judged - len(results.manifest.scans):
+        warn(
+            f"{unlabelled:,} of {results.judged:,} scans are left out: "
+            "the method is sure of none of their points"
+        )
+    if not results.answers.rain:
+        warn("no rain was found: a network would learn that nothing is rain")
+    if not results.held_out:
+        warn("no scan is held out, which takes three scans of a sequence: all are for training")
 
 
 def _finish(work: Labelling, out: Path, known: Sequence[Frame]) -> Manifest:

@@ -28,7 +28,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from derain.annotation.teach import LabelledScan, refuse_to_overwrite
+from derain.annotation.teach import LabelledScan, refuse_to_overwrite, teach
 from derain.cards.card import load_card, packaged_cards
 from derain.cards.known import layouts_for
 from derain.cli import options, unit_options
@@ -41,7 +41,6 @@ from derain.evaluation.text_tables import number_text
 from derain.export.methods import over_recording
 from derain.sources.folders import named_frames
 from derain.sources.judging import Failures
-from derain.workflows.teaching import teach_recordings
 
 
 def add_arguments(parser: Parser) -> None:
@@ -82,7 +81,7 @@ def main(arguments: argparse.Namespace) -> int:
     )
     failures = Failures(print_error)
     with unit_options.executor_of(arguments, workers) as executor:
-        results = teach_recordings(
+        results = teach(
             method,
             source,
             arguments.out,

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from derain.annotation.manifest import FEWEST_SCANS
+from derain.annotation.teach import TeachResults, teach
 from derain.datamodules.taught import Taught
 from derain.errors import InputError, counted
 from derain.export.methods import PERSISTENCE, load_method, named_method, over_recording
@@ -25,7 +26,6 @@ from derain.workflows.fit import fit, fit_options
 from derain.workflows.learn_config import LearnConfig, Student, student_of
 from derain.workflows.learn_report import LEAST_RAIN, LearnResults, write_report
 from derain.workflows.progress import Show, Steps, show_nothing
-from derain.workflows.teaching import TeachResults, teach_recordings
 
 # A folder with this file may be cleared by a second run.
 MARK = "learning.txt"
@@ -171,7 +171,7 @@ def _teach(
     steps.begin(f"Teaching: {config.teacher} labels the scans")
     # The error of one scan is a warning; the others go on.
     guard = Failures(lambda error: warn(str(error))).skipping_failures
-    results = teach_recordings(teacher, recording, config.taught, guard=guard)
+    results = teach(teacher, recording, config.taught, guard=guard)
     labelled = len(results.manifest.scans)
     if not results.held_out:
         reason = f": {warnings[0]}" if warnings else ""

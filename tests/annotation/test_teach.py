@@ -53,7 +53,7 @@ def test_labels_are_rain_not_rain_and_not_known() -> None:
 @pytest.mark.parametrize("make", [Between, lambda: FilterDerainer(DROR(), 1)])
 def test_labels_are_the_answers_of_the_method(make, drive, tmp_path) -> None:
     out = tmp_path / "taught"
-    manifest = teach(make(), of(drive), out)
+    manifest = teach(make(), of(drive), out).manifest
     keys = [scan.key for scan in manifest.scans]
     for frame, judgement, _ in judgements(make(), named_frames([drive])):
         assert (frame.key in keys) == bool(judgement.answered.any())

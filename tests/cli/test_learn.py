@@ -11,6 +11,7 @@ from recorded_scenes import write_scenes
 from recording_read_back import ReadBack
 
 from derain.annotation.manifest import Manifest
+from derain.annotation.teach import TeachResults
 from derain.cards.card import load_card
 from derain.evaluation.answers import Answers
 from derain.evaluation.hard_cases import scene
@@ -22,7 +23,6 @@ from derain.models.checkpoint import save_model
 from derain.models.outdet import OutDet
 from derain.system.notices import warn
 from derain.workflows import learn, learn_report
-from derain.workflows.teaching import TeachResults
 
 pytestmark = pytest.mark.usefixtures("here", "short_proof")
 
@@ -142,7 +142,7 @@ def test_a_recording_of_which_too_few_scans_can_be_labelled_is_refused_with_the_
         warn("2.bin: not to be trusted: it is of another place")
         return TeachResults(Manifest({"method": "dror"}), 5, Answers(), None)
 
-    monkeypatch.setattr(learn, "teach_recordings", teach)
+    monkeypatch.setattr(learn, "teach", teach)
     outcome = run_derain("learn", recording, "--out", "model.onnx", "--teacher", "dror")
     assert outcome.code == 2
     assert "only 0 of 5 scans could be labelled" in outcome.err
