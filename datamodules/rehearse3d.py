@@ -1,12 +1,10 @@
 """REHEARSE-3D: emulated rain, a MEMS LiDAR fused with a 4D radar."""
 
-from derain.cards.card import load_card
-from derain.cards.layout import Layout
 from derain.datamodules.base import Loading
-from derain.datamodules.sequences import SequenceDataModule
+from derain.datamodules.sequences import Sequences
 
 
-class Rehearse3D(SequenceDataModule):
+class Rehearse3D(Sequences):
     """REHEARSE-3D as published: merged LiDAR and radar clouds, and the official split.
 
     The merged files hold x, y, z and intensity, without a mark on the radar's points.
@@ -18,7 +16,6 @@ class Rehearse3D(SequenceDataModule):
 
     Args:
         root: Folder ``REHEARSE3D_PUBLIC``.
-        layout: Names of its folders.
         split: Sequences of ``train``, ``validation`` and ``test``, in place of the official ones.
         loading: Options for reading and batching scans.
 
@@ -28,8 +25,7 @@ class Rehearse3D(SequenceDataModule):
     def __init__(
         self,
         root: str,
-        layout: Layout = load_card("rehearse3d").layout,
         split: dict[str, list[str]] | None = None,
         loading: Loading = Loading(),
     ) -> None:
-        super().__init__(root, load_card("rehearse3d"), layout, split, loading)
+        super().__init__(root, "rehearse3d", split, loading)

@@ -1,59 +1,16 @@
-"""Data modules of scans in sequences."""
+"""Scans and labels in sequences, which a split assigns to train, validation and test."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from derain.cards.card import DataCard, load_card
-from derain.cards.layout import Layout
+from derain.cards.card import load_card
 from derain.datamodules.base import Loading, Part, ScanDataModule
 from derain.datamodules.scan_data import split_source
 from derain.sources.source import Source
 from derain.sources.training_record import record_of_sequences
 
 
-class SequenceDataModule(ScanDataModule):
-    """Scans and labels in sequences, which a split assigns to train, validation and test.
-
-    Args:
-        root: Folder of the data set.
-        card: Data card of the scans.
-        layout: Names of its folders.
-        split: Sequences of ``train``, ``validation`` and ``test``; by default the data card's.
-        loading: Options for reading and batching scans.
-    """
-
-    def __init__(
-        self,
-        root: str,
-        card: DataCard,
-        layout: Layout,
-        split: Mapping[str, Sequence[str]] | None,
-        loading: Loading,
-    ) -> None:
-        super().__init__(card, loading)
-        self.root = Path(root)
-        self.layout = layout
-        self.split = split or card.split
-
-    def source(self, part: Part) -> Source:
-        """The scans of a part's sequences, in order; for prediction those of the test part.
-
-        Raises:
-            InputError: A missing sequence or scan folder.
-        """
-        return split_source(self.root, self.layout, self.split, self.loading.columns, part)
-
-    def training_record(self) -> dict[str, tuple[str, ...]]:
-        """The training scans, recorded by the names of their sequences.
-
-        Simulated sequences have the same names in every data set: their scans are recorded instead.
-        """
-        if self.card.simulated:
-            return super().training_record()
-        return record_of_sequences(self.split.get("train", ()))
-
-
-class Sequences(SequenceDataModule):
+class Sequences(ScanDataModule):
     """Any data set of sequences, described by its data card alone.
 
     A new data set needs no code, only a card with the names of its folders, its split, its classes,
@@ -61,7 +18,7 @@ class Sequences(SequenceDataModule):
 
     Example:
         >>> data = Sequences("KITTI", card="kitti")
-        >>> data.layout.scans, data.split["validation"]
+        >>> data.card.layout.scans, data.split["validation"]
         ('velodyne', ('08', '09'))
 
     Args:
@@ -75,8 +32,26 @@ class Sequences(SequenceDataModule):
         self,
         root: str,
         card: str,
-        split: dict[str, list[str]] | None = None,
+        split: Mapping[str, Sequence[str]] | None = None,
         loading: Loading = Loading(),
     ) -> None:
-        known = load_card(card)
-        super().__init__(root, known, known.layout, split, loading)
+        super().__init__(load_card(card), loading)
+        self.root = Path(root)
+        self.split = split or self.card.split
+
+    def source(self, part: Part) -> Source:
+        """The scans of a part's sequences, in order; for prediction those of the test part.
+
+        Raises:
+            InputError: A missing sequence or scan folder.
+        """
+        return split_source(self.root, self.card.layout, self.split, self.loading.columns, part)
+
+    def training_record(self) -> dict[str, tuple[str, ...]]:
+        """The training scans, recorded by the names of their sequences.
+
+        Simulated sequences have the same names in every data set: their scans are recorded instead.
+        """
+        if self.card.simulated:
+            return super().training_record()
+        return record_of_sequences(self.split.get("train", ()))

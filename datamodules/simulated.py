@@ -2,9 +2,8 @@
 
 from pathlib import Path
 
-from derain.cards.card import load_card
 from derain.datamodules.base import Loading
-from derain.datamodules.sequences import SequenceDataModule
+from derain.datamodules.sequences import Sequences
 from derain.errors import InputError
 from derain.jobs.workers import processes
 from derain.simulation.campaign import Campaign
@@ -14,7 +13,7 @@ from derain.simulation.world import WorldCampaign
 from derain.system.cores import usable_cores
 
 
-class SimulatedDataModule(SequenceDataModule):
+class SimulatedDataModule(Sequences):
     """A simulated data set, made where it is missing.
 
     Args:
@@ -36,7 +35,7 @@ class SimulatedDataModule(SequenceDataModule):
         loading: Loading,
         workers: int = 1,
     ) -> None:
-        card, split = load_card("simulated"), campaign.split
+        split = campaign.split
         if not make:
             manifest = read_manifest(Path(root))
             if not {"files", "split"} <= manifest.keys():
@@ -46,7 +45,7 @@ class SimulatedDataModule(SequenceDataModule):
                     "Make it with `derain simulate --out`.",
                 )
             split = manifest["split"]
-        super().__init__(root, card, card.layout, split, loading)
+        super().__init__(root, "simulated", split, loading)
         self.campaign = campaign
         self.make = make
         self.workers = workers or usable_cores()

@@ -1,12 +1,10 @@
 """WADS: real snow on a 64-beam LiDAR."""
 
-from derain.cards.card import load_card
-from derain.cards.layout import Layout
 from derain.datamodules.base import Loading
-from derain.datamodules.sequences import SequenceDataModule
+from derain.datamodules.sequences import Sequences
 
 
-class Wads(SequenceDataModule):
+class Wads(Sequences):
     """WADS as published, with the split of 3D-OutDet.
 
     About 40 % of the points in its raw scans are duplicates. Scores count distinct points, as its
@@ -19,7 +17,6 @@ class Wads(SequenceDataModule):
 
     Args:
         root: Folder of the data set.
-        layout: Names of its folders.
         split: Sequences of ``train``, ``validation`` and ``test``, in place of the published ones.
         loading: Options for reading and batching scans.
 
@@ -30,8 +27,7 @@ class Wads(SequenceDataModule):
     def __init__(
         self,
         root: str,
-        layout: Layout = load_card("wads").layout,
         split: dict[str, list[str]] | None = None,
         loading: Loading = Loading(),
     ) -> None:
-        super().__init__(root, load_card("wads"), layout, split, loading)
+        super().__init__(root, "wads", split, loading)

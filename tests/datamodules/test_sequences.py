@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from derain.cards.layout import Layout
 from derain.datamodules.base import Loading
 from derain.datamodules.rehearse3d import Rehearse3D
+from derain.datamodules.sequences import Sequences
 from derain.datamodules.wads import Wads
 from derain.errors import InputError
 
@@ -66,8 +66,12 @@ def test_prediction_is_on_the_test_scans_which_need_no_labels(root) -> None:
 def test_folders_can_have_other_names(tmp_path, write) -> None:
     label = tmp_path / "runs/17/truth/a.label"
     write(tmp_path / "runs/17/ouster/a.pcd", label)
-    layout = Layout(sequences="runs", scans="ouster", labels="truth")
-    (frame,) = Rehearse3D(str(tmp_path), layout, split={"train": ["17"]}).frames("train")
+    card = tmp_path / "card.yaml"
+    card.write_text(
+        "{name: mine, classes: {0: road, 1: rain}, rain: [1], "
+        "layout: {sequences: runs, scans: ouster, labels: truth}}"
+    )
+    (frame,) = Sequences(str(tmp_path), str(card), split={"train": ["17"]}).frames("train")
     assert (frame.path.name, frame.label_path) == ("a.pcd", label)
 
 
