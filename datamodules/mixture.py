@@ -1,6 +1,5 @@
 """Several data sets at once, each with its data card and its weight."""
 
-import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -12,6 +11,7 @@ from derain.cards.mixed import LabelMap, label_maps, mixed_card, with_pooled_sta
 from derain.datamodules.base import Loading, Part, ScanDataModule
 from derain.datamodules.order import Draws, shared_out
 from derain.errors import InputError
+from derain.files.documents import Entry
 from derain.learning.batch import Sample
 from derain.scan import Scan
 from derain.sources.frame import Frame
@@ -53,7 +53,7 @@ class Mixture(ScanDataModule):
         loading: Options for batching scans.
 
     Raises:
-        InputError: No parts, or none with rain; a weight that is not greater than 0; the name of no
+        InputError: No part with rain; a weight that is not greater than 0; the name of no
             part, or one with other characters than letters, digits, _ and -; a part that is a
             mixture itself; a scale of intensity for all parts.
     """
@@ -73,14 +73,7 @@ class Mixture(ScanDataModule):
             if name not in parts:
                 raise InputError(f"part '{name}'", "there is none", f"Parts: {', '.join(parts)}.")
         for name, weight in weights.items():
-            if not (math.isfinite(weight) and weight > 0):
-                raise InputError(
-                    f"part '{name}'",
-                    f"its weight is {weight:g}",
-                    "Give a number greater than 0, or leave the part out.",
-                )
-        if scans_per_epoch is not None and scans_per_epoch < 1:
-            raise InputError("scans_per_epoch", f"is {scans_per_epoch}", "Give 1 or more.")
+            Entry("weights", name, weight).positive()
         if loading.intensity_scale != 1:
             raise InputError(
                 "loading.intensity_scale", "would be that of all parts", "Give it to each part."
@@ -130,7 +123,6 @@ class Mixture(ScanDataModule):
         Raises:
             InputError: A scan that cannot be read, or a part without one of the columns.
         """
-        self._refuse_missing(columns)
         for part in self.parts.values():
             part.complete_card(columns, labelled)
         cards = _cards(self.parts)
@@ -160,39 +152,19 @@ class Mixture(ScanDataModule):
         """Training scans, drawn by weight, in a new order and newly augmented every epoch.
 
         Raises:
-            InputError: Intensities that the model sees, in units that differ or missing in a part.
+            InputError: Intensities that the model sees, in units that differ by the parts' cards.
         """
-        if self.task is not None and "intensity" in self.task.spec.channels:
-            self._refuse_missing(["intensity"])
-            self._refuse_units()
-        return super().train_dataloader()
-
-    def _refuse_missing(self, channels: Sequence[str]) -> None:
-        """Refuses channels that are missing in the first training scan of some part."""
-        for name, part in self.parts.items() if channels else ():
-            scan = next(part.training_scans(1, channels, labelled=False))
-            for channel in channels:
-                if scan.channel(channel) is None:
-                    raise InputError(
-                        f"part '{name}'",
-                        f"{scan.name} has no {channel}, which the model needs",
-                        "Leave the part out, or leave the channel out of --model.channels.",
-                    )
-
-    def _refuse_units(self) -> None:
-        """Refuses intensities of different units, by the parts' cards."""
-        units = {
-            name: part.card.intensity_unit
-            for name, part in self.parts.items()
-            if part.card.intensity_unit != DataCard.intensity_unit
-        }
-        if len({*units.values()}) > 1:
+        units = {part.card.intensity_unit for part in self.parts.values()}
+        units.discard(DataCard.intensity_unit)  # of a card that states none
+        sees_intensity = self.task is not None and "intensity" in self.task.spec.channels
+        if sees_intensity and len(units) > 1:
             raise InputError(
-                "intensity",
-                ", ".join(f"'{name}' has it in {unit}" for name, unit in units.items()),
-                "Leave it out of --model.channels, or convert them to one unit, by the cards and "
-                "loading.intensity_scale of the parts.",
+                "parts",
+                f"their intensities differ in unit: {', '.join(sorted(units))}",
+                "Leave intensity out of --model.channels, or convert it to one unit, by the cards "
+                "and loading.intensity_scale of the parts.",
             )
+        return super().train_dataloader()
 
 
 def _cards(parts: Mapping[str, ScanDataModule]) -> dict[str, DataCard]:
@@ -210,8 +182,6 @@ def _of_part(frame: Frame, name: str, loading: Loading, label_map: LabelMap) -> 
 
 
 def _check_parts(parts: Mapping[str, ScanDataModule]) -> None:
-    if not parts:
-        raise InputError("parts", "there are none", "Give a data module for each name.")
     for name, part in parts.items():
         if not _NAME.fullmatch(name):
             raise InputError(
@@ -220,7 +190,4 @@ def _check_parts(parts: Mapping[str, ScanDataModule]) -> None:
         if part.card.parts:
             raise InputError(f"part '{name}'", "is a mixture itself", "Name its parts.")
     if not any(part.card.rain for part in parts.values()):
-        names = ", ".join(dict.fromkeys(part.card.name for part in parts.values()))
-        raise InputError(
-            "parts", f"no class of {names} is rain", "Give a part with rain, or another card."
-        )
+        raise InputError("parts", "no class of them is rain", "Give a part with rain.")

@@ -67,7 +67,7 @@ class Draws:
         total = sum(scans.values()) if total is None else total
         drawn = shared_out(total, [weights[name] for name in scans])
         for name, number in zip(scans, drawn, strict=True):
-            if not number:
+            if number < 1:
                 raise InputError(
                     f"part '{name}'",
                     f"its weight gives it none of the {total} scans of an epoch",

@@ -159,6 +159,7 @@ def test_draws_differ_by_seed_and_epoch_and_are_known_without_the_earlier_ones()
     assert orders(57, 1, 4, 2, draws) == [epochs[-1]]
 
 
-def test_a_part_without_a_scan_of_an_epoch_is_warned_of() -> None:
-    with pytest.raises(InputError, match="'dim': its weight gives it none of the 10 scans"):
-        Draws.by_weight({"dim": 10, "bright": 10}, {"dim": 0.01, "bright": 1}, 10)
+@pytest.mark.parametrize("total", [10, 0, -1])
+def test_a_part_without_a_scan_of_an_epoch_is_refused(total) -> None:
+    with pytest.raises(InputError, match=f"its weight gives it none of the {total} scans"):
+        Draws.by_weight({"dim": 10, "bright": 10}, {"dim": 0.01, "bright": 1}, total)
