@@ -1,11 +1,10 @@
 """Reads, augments and views the scans of a data set one by one, and keeps what stays the same."""
 
+import pickle
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-import numpy as np
-import torch
 from torch.utils.data import Dataset
 
 from derain.datamodules.augmentation import Augmentation
@@ -102,13 +101,13 @@ class ScanDataset(Dataset[Sample | InputError]):
 
 
 class Cache:
-    """Items by number, as many as fit into memory.
+    """Items by number, from the first on as many as fit into memory.
 
     The first items stay. Every epoch needs each item once: a cache that evicted the oldest would
     have evicted each item before its next use.
 
     Args:
-        room: Bytes that the arrays of all items together may fill.
+        room: Bytes that all items together may fill.
     """
 
     def __init__(self, room: int) -> None:
@@ -120,22 +119,8 @@ class Cache:
         if number in self._items:
             return self._items[number]
         made = make()
-        size = bytes_of(made)
-        if size <= self._left:
-            self._left -= size
-            self._items[number] = made
+        if self._left > 0:  # none after the first that does not fit is measured
+            self._left -= len(pickle.dumps(made, pickle.HIGHEST_PROTOCOL))
+            if self._left >= 0:
+                self._items[number] = made
         return made
-
-
-def bytes_of(item: object) -> int:
-    """Bytes of the arrays of a scan or a sample; shared memory is counted twice."""
-    match item:
-        case np.ndarray() | torch.Tensor():
-            return int(item.nbytes)
-        case dict():
-            return sum(map(bytes_of, item.values()))
-        case list() | tuple():
-            return sum(map(bytes_of, item))
-        case _ if hasattr(item, "__dict__") and not callable(item):
-            return bytes_of(vars(item))
-    return 0
