@@ -263,12 +263,12 @@ def _known(
         if scan.error is not None:
             with guard(scan.frame):
                 raise scan.error
-            continue
-        results.add(scan)
-        notices.warn(scan.frame.name, scan.issues)
-        watch(scan)
-        if scan.is_known:
-            frames.append(scan.frame)
+        else:
+            results.add(scan)
+            notices.warn(scan.frame.name, scan.issues)
+            watch(scan)
+            if scan.is_known:
+                frames.append(scan.frame)
     notices.warn_of_repeats()
     return frames
 
