@@ -6,7 +6,6 @@ from typing import Any
 import lightning
 from lightning.pytorch.trainer.states import TrainerFn
 
-from derain.cards.rain_found import warn_without_rain
 from derain.datamodules.base import Part, ScanDataModule
 from derain.sources.spread import evenly_spaced
 from derain.sources.training_record import training_overlap
@@ -24,7 +23,6 @@ class ScanCheck(lightning.Callback):
 
     def __init__(self, scans: int = 10) -> None:
         self.scans = scans
-        self._validated = False
 
     def on_fit_start(self, trainer: lightning.Trainer, model: Any) -> None:
         """Checks training scans."""
@@ -34,16 +32,6 @@ class ScanCheck(lightning.Callback):
         """Checks validation scans, unless they belong to a training."""
         if trainer.state.fn == TrainerFn.VALIDATING:
             self._check(trainer, model, "validation")
-
-    def on_validation_end(self, trainer: lightning.Trainer, model: Any) -> None:
-        """Warns once where the scans had labels and no rain."""
-        if not (trainer.sanity_checking or self._validated):
-            self._validated = True
-            _warn_without_rain(trainer, model)
-
-    def on_test_end(self, trainer: lightning.Trainer, model: Any) -> None:
-        """Warns where the scans had no rain."""
-        _warn_without_rain(trainer, model)
 
     def on_test_start(self, trainer: lightning.Trainer, model: Any) -> None:
         """Checks test scans."""
@@ -68,14 +56,6 @@ class ScanCheck(lightning.Callback):
             note = training_overlap("the model", model.spec, model.card, frames)
             if note is not None:
                 warn(note)
-
-
-def _warn_without_rain(trainer: lightning.Trainer, model: Any) -> None:
-    # Every process counts, for the counts of all are gathered.
-    measured = model.metrics.counts()
-    counts = measured.pooled
-    if trainer.is_global_zero and measured.per_scan:
-        warn_without_rain(bool(counts.true_positive + counts.false_negative), model.card)
 
 
 def _here(detail: str) -> str:

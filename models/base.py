@@ -237,6 +237,7 @@ class DerainingModule(MeasuredModule):
         Raises:
             InputError: Neither a data module, nor a task that was agreed before.
         """
+        self.warned_of_no_rain = False  # in this run
         data = self.trainer.datamodule  # type: ignore[attr-defined]
         if not isinstance(data, TrainingData):
             if not hasattr(self, "card"):

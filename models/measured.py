@@ -8,11 +8,11 @@ from typing import Any, ClassVar
 import lightning
 import torch
 from lightning.pytorch.loggers import TensorBoardLogger
-from lightning.pytorch.trainer.states import TrainerFn
 from torch import Tensor
 from torch.utils.tensorboard.summary import hparams
 
 from derain.cards.card import DataCard
+from derain.cards.rain_found import warn_without_rain
 from derain.evaluation.counts import SCORES, Counts
 from derain.evaluation.metrics import RainMetrics
 from derain.evaluation.operating_points import ThresholdCounts
@@ -21,7 +21,6 @@ from derain.learning.mean_losses import MeanLosses
 from derain.learning.task import ReadableScans
 from derain.scan import Float32s, Scan
 from derain.spec import Spec
-from derain.system.notices import warn
 from derain.views.probability import probability_of_rain
 
 # The monitor, by which the best checkpoint of a run is chosen, the more the better: the IoU of the
@@ -168,6 +167,7 @@ class MeasuredModule(lightning.LightningModule, ABC):
         counts = self.metrics.counts()
         if not counts.per_scan:  # scans without labels measure nothing
             return
+        self._warn_without_rain(counts.pooled)
         scores = self.metrics.compute() | self.threshold_counts.compute()
         self._log_identical({f"{part}/{name}": score for name, score in scores.items()})
         self._log_identical({f"{part}_iou": scores["iou"]}, prog_bar=True, logger=False)
@@ -184,12 +184,16 @@ class MeasuredModule(lightning.LightningModule, ABC):
         if counts.true_positive + counts.false_negative:
             return torch.tensor(counts.iou, dtype=torch.float32, device=loss.device)
         # Without rain the IoU is undefined, or 0 because of a single point.
-        trainer = self.trainer
-        fitting = trainer.state.fn == TrainerFn.FITTING and not trainer.sanity_checking
-        if fitting and trainer.is_global_zero and not self.warned_of_no_rain:
-            warn("the validation scans have no rain: the best checkpoint is chosen by their loss")
-            self.warned_of_no_rain = True
         return -loss
+
+    def _warn_without_rain(self, counts: Counts) -> None:
+        """Warns once where the measured scans have no rain."""
+        found = bool(counts.true_positive + counts.false_negative)
+        trainer = self.trainer
+        if not (found or trainer.sanity_checking or self.warned_of_no_rain):
+            self.warned_of_no_rain = True
+            if trainer.is_global_zero:
+                warn_without_rain(found, self.card)
 
     def _log_of_one(self, title: str, counts: Counts) -> None:
         """Logs the scores of one of several data sets, where any scan of it was measured."""
