@@ -68,10 +68,8 @@ class Augmentation:
     @property
     def changes_anything(self) -> bool:
         """True if any scan is changed."""
-        of_points = self.jitter_probability, self.dropping_probability
-        of_scans = self.rotation_probability, self.mirror_probability
-        other = self.brightness_probability, self.user_probability
-        return max(*of_points, *of_scans, *other) > 0
+        drawn = asdict(self).items()
+        return any(share for name, share in drawn if name.endswith("_probability"))
 
     def __call__(
         self,
