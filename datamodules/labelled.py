@@ -12,7 +12,6 @@ from pathlib import Path
 from derain.annotation.manifest import CARD, Manifest, is_taught
 from derain.cards.card import DataCard, load_card, packaged_cards
 from derain.cards.known import card_by_folders, layouts_for
-from derain.cards.layout import Layout
 from derain.datamodules.scan_data import Loading, Part, ScanData, split_source, taught_source
 from derain.errors import InputError
 from derain.example import example_folder, or_example
@@ -67,8 +66,7 @@ def labelled_scans(
         topic: Topic of the bags among them; None where each has only one of clouds.
 
     Raises:
-        InputError: A root beside other paths, or one whose sequences hold no known folder of
-            scans.
+        InputError: A root beside other paths.
     """
     taught = [path for path in paths if is_taught(path)]
     roots = taught or [path for path in paths if os.path.isdir(path / card.layout.sequences)]
@@ -85,8 +83,10 @@ def labelled_scans(
         source_of = partial(taught_source, root, Manifest.read(root))
         return LabelledScans(load_card(root / CARD), loading, source_of)
     split = read_manifest(root).get("split") or card.split
-    source_of = partial(split_source, root, _layout_of(root, card), split, loading.columns)
-    return LabelledScans(card, loading, source_of)
+    layout = find_layout(root / card.layout.sequences, layouts_for(card)) or card.layout
+    # The folder of sequences has the name in this card, whatever another layout calls it.
+    layout = replace(layout, sequences=card.layout.sequences)
+    return LabelledScans(card, loading, partial(split_source, root, layout, split, loading.columns))
 
 
 def named_scans(
@@ -153,18 +153,3 @@ def rain_rates(paths: Sequence[Path], file: Path | None) -> Mapping[str, float]:
     if file is None:
         return dict(manifest_of(paths[0]).get(RAIN_RATE, {}))
     return rates_of_sequences(Entry.of_yaml(file))
-
-
-def _layout_of(root: Path, card: DataCard) -> Layout:
-    """Names of the folders in a data set's sequences: those of its card or of another."""
-    sequences, layouts = root / card.layout.sequences, layouts_for(card)
-    layout = find_layout(sequences, layouts)
-    if layout is None:
-        folders = dict.fromkeys(known.scans for known in layouts)
-        raise InputError(
-            sequences,
-            f"no sequence has a folder {' or '.join(folders)}",
-            "Name the folders of scans themselves, or give their names in --card.",
-        )
-    # The folder of sequences has the name in this card, whatever another layout calls it.
-    return replace(layout, sequences=card.layout.sequences)

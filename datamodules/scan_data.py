@@ -184,8 +184,8 @@ def split_source(
             raise InputError(
                 folder / layout.scans,
                 f"no such folder, though the split names sequence {folder.name}",
-                "Check the root. If only some sequences are there, give `derain fit` a "
-                "--data.split, and other commands the folders of scans.",
+                "Check the root, and the layout of its data card. If only some sequences are "
+                "there, give `derain fit` a --data.split, and other commands the folders of scans.",
             )
     scans = listed_scans(folder / layout.scans for folder in folders)
     return frames_of(scans, layout.label_of, columns, relative_keys(scans))

@@ -90,8 +90,8 @@ def test_rehearse3d_is_known_by_its_folders_and_anything_else_needs_a_card(tmp_p
 
 def test_a_root_whose_sequences_hold_no_scans_is_refused(tmp_path) -> None:
     (tmp_path / "sequences/00/other").mkdir(parents=True)
-    with pytest.raises(InputError, match="no sequence has a folder velodyne or lidar"):
-        labelled_scans([tmp_path], load_card("kitti"), Loading())
+    with pytest.raises(InputError, match=r"00/velodyne: no such folder.* layout of its data card"):
+        labelled_scans([tmp_path], load_card("kitti"), Loading()).source("train")
 
 
 def test_rain_rates_are_read_by_the_name_of_the_sequence(tmp_path) -> None:
