@@ -228,26 +228,25 @@ def teach(
     work = Labelling(method, method.fingerprint(), out.absolute(), card)
     record = None if card is None else TruthRecord(card)
     results = TeachResults(Manifest(method.as_dict(), finished=False), record=record)
-    if division is None or not division.keeps_records(source, out):
-        if is_taught(out):
-            documents_at(work.out, FOLDER).remove_all()  # records of labels that are replaced now
-        results.manifest.write(out)
-        known = _known(work.do(whole(source)), len(source), guard, watch, results)
-    else:
+    units = shard = [whole(source)]
+    job = None
+    if division is not None and division.keeps_records(source, out):
         options = work.options("teach", source, division.block)
         options["card"] = None if card is None else card.name
         units = units_of(source, method, division.block)
         job, shard = division.begin(work.out, options, units)
-        results.manifest.write(out)
-        task = Task(job, work)
-        judged = (result for _, result, _ in run(task, shard, executor))
-        known = _known(judged, sum(len(unit.frames) for unit in shard), guard, watch, results)
-        if division.shard is not None:
-            scans = completed(task, units)
-            if scans is not None:
-                known = [scan.frame for scan in scans if scan.is_known]
-                results.manifest = _finish(work, out, known)
-            return results
+    elif is_taught(out):
+        documents_at(work.out, FOLDER).remove_all()  # records of labels that are replaced now
+    results.manifest.write(out)
+    task = Task(job, work)
+    judged = (result for _, result, _ in run(task, shard, executor if job else None))
+    known = _known(judged, sum(len(unit.frames) for unit in shard), guard, watch, results)
+    if division is not None and division.shard is not None:
+        scans = completed(task, units)
+        if scans is not None:
+            known = [scan.frame for scan in scans if scan.is_known]
+            results.manifest = _finish(work, out, known)
+        return results
     results.manifest = _finish(work, out, known)
     _warn_of_little(results)
     return results
