@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 import torch
 from lightning import Callback
+from lightning.pytorch.trainer.states import TrainerFn
 from lightning.pytorch.utilities.types import OptimizerLRScheduler
 from torch import Tensor, nn
 
@@ -265,6 +266,8 @@ class DerainingModule(MeasuredModule):
         agreed = self._spec
         self.trained_steps = checkpoint.get("global_step")
         self.adopt(spec)
+        if self._trainer is not None and self._trainer.state.fn != TrainerFn.FITTING:
+            checkpoint.pop("loops", None)  # no measurement goes on with an earlier one
         data = getattr(self._trainer, "datamodule", None)
         if isinstance(data, TrainingData):
             agree_on_task(self, data, training=False)  # again: the checkpoint has the last word

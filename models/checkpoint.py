@@ -20,11 +20,11 @@ from derain.files.documents import Entry, shown
 from derain.files.reading import reading
 from derain.learning.start import Start
 from derain.models.base import DerainingModule
+from derain.models.callbacks.resumption import LARGEST_COUNT, REMEDY
 from derain.models.former_names import FORMER_NETWORKS
 from derain.models.limits import check_hyperparameters
 from derain.models.published import LOAD_ERRORS, read_checkpoint, with_tensors
 from derain.models.registry import NETWORKS
-from derain.models.saved_state import LARGEST_COUNT, REMEDY, matching_state
 from derain.spec import Spec
 
 # Entries that Lightning requires in a checkpoint to resume a training.
@@ -267,22 +267,6 @@ def _check_progress(content: Mapping[str, Any], path: Path) -> None:
         Entry(path, name, content.get(name)).whole(0, LARGEST_COUNT)
     for state in Entry(path, "callbacks", content.get("callbacks", {})).members().values():
         state.members()
-    if "loops" in content:
-        _check_loops(Entry(path, "loops", content["loops"]))
-
-
-def _check_loops(loops: Entry) -> None:
-    """Refuses states of loops that a trainer has not, or that are not like its own."""
-    # States before there is any progress, as checkpoints have them.
-    trainer = _idle_trainer()
-    names = [f"{stage}_loop" for stage in ("fit", "validate", "test", "predict")]
-    fresh = {name: getattr(trainer, name).state_dict() for name in names}
-    matching_state(loops, {name: {} for name in fresh})  # all of them are there
-    for name, own in fresh.items():
-        parts = loops.members()[name].members()
-        for key in own.keys() & parts.keys():
-            if matching_state(parts[key], own[key]) != parts[key].value:
-                raise parts[key].fault("holds more than Lightning writes", REMEDY)
 
 
 def _idle_trainer() -> lightning.Trainer:

@@ -115,7 +115,6 @@ HOSTILE: dict[str, Change] = {
     "loops in a list": _setting("loops", [1]),
     "no loop of a training": _dropping("loops", "fit_loop"),
     "progress that is a text": _setting(*PROGRESS, "far"),
-    "progress that replaces a method": _setting(*PROGRESS, "total", "reset", 5),
     "negative progress": _setting(*PROGRESS, "total", "ready", -5),
     "no optimisers": _setting("optimizer_states", []),
     "optimisers in a mapping": _setting("optimizer_states", {"adam": 1}),

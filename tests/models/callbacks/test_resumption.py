@@ -13,9 +13,9 @@ from benchmarks.fuzzing.checkpoints import HOSTILE, go_on, hostile, trained
 from derain.errors import InputError
 from derain.files.documents import Entry
 from derain.models.callbacks.best_checkpoint import BestCheckpoint
+from derain.models.callbacks.resumption import matching_state
 from derain.models.measured import MONITOR
 from derain.models.published import read_checkpoint
-from derain.models.saved_state import matching_state
 
 
 @pytest.fixture
@@ -54,6 +54,9 @@ def test_a_number_may_be_infinite_where_it_is_before_the_first_score() -> None:
     ("found", "own"),
     [
         ({}, {"base_lrs": []}),
+        ([1], {"base_lrs": []}),
+        ({"base_lrs": []}, [1]),
+        (2**60, 1),
         ({"best": math.nan}, {"best": math.inf}),
         (math.inf, 0.5),
         (-0.5, 0.5),
