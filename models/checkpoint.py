@@ -1,7 +1,6 @@
 """Checkpoints on disk: written whole, read without trust, and begun from."""
 
 import io
-import logging
 import re
 from collections.abc import Mapping
 from hashlib import sha256
@@ -137,9 +136,14 @@ def save_model(model: DerainingModule, path: Path) -> None:
     """
     # Lightning's own command line would find the class by this name; derain's does not ask it.
     model.hparams["_class_path"] = class_path(type(model))
-    trainer = _idle_trainer()
-    trainer.strategy.connect(model)
-    save_whole(trainer).save_checkpoint(path, weights_only=True)
+    content = {
+        "epoch": 0,
+        "global_step": 0,
+        "pytorch-lightning_version": lightning.__version__,
+        "state_dict": model.state_dict(),
+        "hyper_parameters": dict(model.hparams),
+    }
+    WholeCheckpoints().save_checkpoint(content, path)
 
 
 class WholeCheckpoints(TorchCheckpointIO):
@@ -267,16 +271,3 @@ def _check_progress(content: Mapping[str, Any], path: Path) -> None:
         Entry(path, name, content.get(name)).whole(0, LARGEST_COUNT)
     for state in Entry(path, "callbacks", content.get("callbacks", {})).members().values():
         state.members()
-
-
-def _idle_trainer() -> lightning.Trainer:
-    """A trainer that prints nothing of its hardware, for it does nothing but write."""
-    logger = logging.getLogger("lightning.pytorch.utilities.rank_zero")
-    level = logger.level
-    logger.setLevel(logging.ERROR)
-    try:
-        return lightning.Trainer(
-            accelerator="cpu", logger=False, enable_checkpointing=False, enable_model_summary=False
-        )
-    finally:
-        logger.setLevel(level)
