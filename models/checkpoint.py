@@ -20,7 +20,6 @@ from derain.files.reading import reading
 from derain.learning.start import Start
 from derain.models.base import DerainingModule
 from derain.models.callbacks.resumption import LARGEST_COUNT, REMEDY
-from derain.models.former_names import FORMER_NETWORKS
 from derain.models.limits import check_hyperparameters
 from derain.models.published import LOAD_ERRORS, read_checkpoint, with_tensors
 from derain.models.registry import NETWORKS
@@ -221,10 +220,6 @@ def _model_of(content: Mapping[str, Any], path: Path) -> DerainingModule:
             "Convert published weights with `derain import-weights`.",
         )
     spec = Spec.from_dict(parameters["spec"], path)
-    if remedy := FORMER_NETWORKS.get(spec.network):
-        raise InputError(
-            path, f"a checkpoint of {spec.network}, a network that derain no longer has", remedy
-        )
     if spec.network not in NETWORKS:
         raise InputError(
             path,

@@ -5,15 +5,6 @@ from typing import Any
 # The names that options have now, by their former names.
 FORMER_OPTIONS = {"way_back": "back_projection", "kept_megabytes": "cache_mb"}
 
-# Options that derain has no longer, and what to do about a configuration that has them.
-_SECTORS = "Delete the lines `sector_probability` and `sector`: scans are no longer cut to sectors."
-REMOVED_OPTIONS = {"sector_probability": _SECTORS, "sector": _SECTORS}
-
-# Networks that derain has no longer, and what to do about a checkpoint of one.
-FORMER_NETWORKS = {
-    "relative_outdet": "Train `cues`, which replaced it; ONNX files of it still run.",
-}
-
 FORMER_MONITOR, MONITOR = "val/merit", "val/score"
 
 

@@ -10,7 +10,7 @@ from jsonargparse import ArgumentParser
 from lightning.fabric.utilities.exceptions import MisconfigurationException
 
 from derain.errors import InputError
-from derain.models.former_names import FORMER_OPTIONS, REMOVED_OPTIONS
+from derain.models.former_names import FORMER_OPTIONS
 
 # Steps of a key in a file that an option on the command line leaves out.
 IMPLIED = ("class_path", "init_args")
@@ -83,8 +83,6 @@ def as_input_error(message: str, known: Collection[str]) -> InputError:
 
 def _unknown(key: str, known: Collection[str]) -> InputError:
     section, dot, name = key.rpartition(".")
-    if name in REMOVED_OPTIONS:
-        return InputError(key, "no such option any more", REMOVED_OPTIONS[name])
     renamed = f"{section}{dot}{FORMER_OPTIONS.get(name, name)}"
     likely = [renamed, OF_OTHER_PROGRAMS.get(key, "")]
     likely += sorted(option for option in known if option.endswith(f".{key}"))

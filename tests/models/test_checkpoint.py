@@ -88,7 +88,6 @@ def test_a_checkpoint_of_something_else_is_refused(content, path, change) -> Non
     ("change", "reason"),
     [
         ({"network": "pointnet"}, "a checkpoint of 'pointnet',"),
-        ({"network": "relative_outdet"}, "a checkpoint of relative_outdet, .*Train `cues`"),
         ({"schema": SCHEMA + 1}, "its Spec: schema .*Upgrade derain"),
         ({"classes": None}, "its Spec: classes"),
         ({"mean": [1.0, 2.0, 3.0, "4"]}, "its Spec: mean"),

@@ -44,10 +44,6 @@ def test_an_option_is_refused_in_a_line(last_line, option, value, message) -> No
     ("content", "message"),
     [
         (SIMULATED % "{loading: {kept_megabytes: 1}}", "Did you mean data.loading.cache_mb?"),
-        (
-            SIMULATED % "{loading: {augmentation: {sector_probability: 0, sector: 90}}}",
-            "augmentation.sector_probability: no such option any more. Delete the lines",
-        ),
         (SIMULATED % "{campaign: {scans: many}}", "data.campaign.scans: cannot be many. Give: int"),
         ("seed_everythin: 3", "seed_everythin: no such option. Did you mean seed_everything?"),
         ("model: {class_path: os.system}", "os.system does not correspond to"),
