@@ -4,19 +4,15 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from numbers import Integral
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
 
 from derain.errors import InputError
 
-# Where Linux lists the control groups of a process, of version 1 or 2, and where they are mounted.
-MEMBERSHIP = Path("/proc/self/cgroup")
-GROUPS = Path("/sys/fs/cgroup")
-
-# Files of a group, by version, that state its quota and its period: how many microseconds of
-# processor time in how many; no limit is -1 in version 1, and ``max`` in version 2.
-# Source: Linux, Documentation/scheduler/sched-bwc.rst; Documentation/admin-guide/cgroup-v2.rst.
-QUOTA_FILES = (("cpu.cfs_quota_us", "cpu.cfs_period_us"), ("cpu.max",))
+# Where Linux has the limit of a container's processor time: how many microseconds of it in how many;
+# no limit is ``max``.
+# Source: Linux, Documentation/admin-guide/cgroup-v2.rst.
+GROUP_LIMIT = Path("/sys/fs/cgroup/cpu.max")
 
 # The most threads that may be asked for. Each takes memory, and a million take all of it.
 MOST_THREADS = 1024
@@ -32,7 +28,11 @@ def usable_cores() -> int:
     They are the cores that it may run on, and in a container with limited processor time no more
     than that time keeps busy, rounded up: further threads would only wait.
     """
-    return max(1, min([_allowed_cores(), *_quotas()]))
+    cores = _allowed_cores()
+    with suppress(OSError, ValueError):  # ValueError: no limit, ``max``, is no number
+        quota, period = map(int, GROUP_LIMIT.read_text("utf-8").split())
+        cores = min(cores, -(-quota // max(period, 1)))
+    return max(1, cores)
 
 
 def threads_of(threads: Any) -> int:
@@ -70,29 +70,3 @@ def sleeping_threads() -> Iterator[None]:
 
 def _allowed_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _quotas() -> Iterator[int]:
-    """Cores that each group's quota keeps busy; a missing or malformed file sets none."""
-    for group in _groups():
-        for files in QUOTA_FILES:
-            with suppress(OSError, ValueError):  # ValueError: no limit, ``max``, is no number
-                words = " ".join((group / file).read_text("utf-8") for file in files).split()
-                quota, period = map(int, words)
-                if quota > 0 and period > 0:
-                    yield -(-quota // period)
-
-
-def _groups() -> Iterator[Path]:
-    """The control groups that may limit the process's time: its own, and all that hold those.
-
-    In a container a path may be that on the machine, while the folder of the container's own group
-    is mounted at the top. The top is one of the groups that are looked at.
-    """
-    with suppress(OSError, ValueError):
-        for line in MEMBERSHIP.read_text("utf-8").splitlines():
-            _, controllers, path = line.split(":", 2)  # of version 2 if it names no controllers
-            if not controllers or "cpu" in controllers.split(","):
-                own = PurePosixPath(path.lstrip("/"))
-                for group in (own, *own.parents):
-                    yield GROUPS / controllers / group
