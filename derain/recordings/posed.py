@@ -18,9 +18,6 @@ from derain.sources.unreadable_bag import UnreadableBag
 # What stands for the poses of a sensor at rest.
 STANDING = "standing"
 
-# Methods that need poses find them so where there are none; it is not the name of a file.
-ODOMETRY = "odometry"
-
 
 def with_poses(source: Source, poses: str | Path | None) -> Source:
     """The same frames, each with its pose.
@@ -39,12 +36,6 @@ def with_poses(source: Source, poses: str | Path | None) -> Source:
     """
     if poses is None:
         return source
-    if poses == ODOMETRY:
-        raise InputError(
-            "--poses",
-            f"{ODOMETRY} is no file: methods compute poses themselves where scans have none",
-            "Leave it out; or run `derain odometry SCANS --out p.txt`, and give --poses p.txt.",
-        )
     if poses == STANDING:
         return Frames(frame.with_pose(np.eye(4)) for frame in source)
     path, recordings = Path(poses), recordings_of(source)

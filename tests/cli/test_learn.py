@@ -117,7 +117,6 @@ def test_a_folder_of_something_else_is_not_cleared(refused, recording) -> None:
         (2, (), "2 scans: too few for training and validation"),
         (3, ("--teacher", "nobody"), "derain: nobody: no such method or file"),
         (3, ("--poses", "none.txt", "--teacher", "dror"), "none.txt"),
-        (3, ("--poses", "odometry", "--teacher", "dror"), "--poses: odometry is no file"),
     ],
 )
 def test_what_cannot_be_learnt_from_is_refused_and_leaves_no_model_and_what_was_learnt_before(

@@ -107,7 +107,6 @@ def test_nothing_is_left_where_the_output_cannot_be_written(
         (["{model}", "scans", "--probability"], "000000.bin: the columns of such a file have no"),
         (["dror", "scans", "--topic", "/points"], "no bag is named"),
         (["dror", "scans", "--poses", "none.txt"], "none.txt: "),
-        (["dror", "scans", "--poses", "odometry"], "--poses: odometry is no file"),
         (["dror", "scans", "--warning", "40", "30"], "Give two numbers of metres, the second"),
         (["dror", "scans", "--error", "35", "38"], "does not lie below the warning"),
         (["{model}", "scans", "--past", "51"], "--past: 51 is more than 50"),

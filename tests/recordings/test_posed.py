@@ -44,13 +44,6 @@ def test_a_sensor_at_rest_is_at_the_identity() -> None:
     assert all((frame.pose == np.eye(4)).all() for frame in with_poses(drive, "standing"))
 
 
-def test_the_word_odometry_is_refused_with_what_to_do_instead() -> None:
-    drive = Frames.of_scans([Scan(np.ones((1, 3)))])
-    assert with_poses(drive, None) is drive
-    with pytest.raises(InputError, match=r"--poses: odometry.*derain odometry .*--out p\.txt"):
-        with_poses(drive, "odometry")
-
-
 def test_a_scan_taken_before_the_one_that_it_follows_is_not_trusted(drive) -> None:
     odometry = FrameOdometry()
     times = (0.0, 0.1, 0.1, 0.05)
