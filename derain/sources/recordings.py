@@ -57,25 +57,15 @@ def irregularities(
         frames: Frames in time order, one recording after the other.
         window: Scans that the method uses. If it uses one, there are no faults, and nothing is
             read.
-        needed: False if it can judge a scan without the others. Recordings may then be short and
-            have breaks, but not times that are damaged or do not rise.
+        needed: False if it can judge a scan without the others. Recordings may then have breaks,
+            but not times that are damaged or do not rise.
 
     Yields:
         One sentence for each fault.
     """
     if window.is_one_scan:
         return
-    recordings = recordings_of(frames)
-    short = [each for each in recordings if len(each) <= window.before + window.after]
-    if short and needed:
-        others = f" ({len(short):,} recordings are as short)" if len(short) > 1 else ""
-        scans = counted(len(short[0]), "scan")
-        yield (
-            f"{short[0][0].name}: {scans} in its recording{others}; the method "
-            f"uses {window.before} scans before and {window.after} after each, and is less sure "
-            "without them"
-        )
-    for recording in recordings:
+    for recording in recordings_of(frames):
         yield from _irregular_steps(recording, needed)
 
 
