@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
-from inspect import isabstract, signature
+from inspect import signature
 from pkgutil import iter_modules
 from typing import Any, Generic, TypeVar, cast
 
@@ -51,18 +51,10 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
         """Decorates a member, which gets these names.
 
         Raises:
-            InputError: A name that another member has, or a class without a method that its base
-                class requires.
+            InputError: A name that another member has.
         """
 
         def added(member: Member) -> Member:
-            if isabstract(member):
-                missing = ", ".join(sorted(getattr(member, "__abstractmethods__", ())))
-                raise InputError(
-                    f"{self.group}: {names[0]}",
-                    f"{_origin(member)} is without {missing}",
-                    "Define it as the base class describes.",
-                )
             for name in names:
                 former = _origin(self._members.get(name, member))
                 if former != _origin(member):

@@ -2,7 +2,7 @@
 
 import importlib
 import sys
-from collections.abc import Callable, Iterator, Sized
+from collections.abc import Callable, Iterator
 
 import pytest
 
@@ -122,13 +122,6 @@ def test_two_of_one_name_are_refused_and_both_are_named(things) -> None:
     with pytest.raises(InputError, match=both):
         things.add("cobble", "brick")(type("Other", (), {}))
     assert "cobble" not in things
-
-
-def test_a_class_without_a_method_of_its_base_is_refused_and_the_method_is_named(things) -> None:
-    sand = type("Sand", (Sized,), {})
-    with pytest.raises(InputError, match=r"things: sand: .*Sand is without __len__"):
-        things.add("sand")(sand)
-    assert "sand" not in things
 
 
 def test_one_member_may_have_several_names_and_answers_to_the_first(things) -> None:
