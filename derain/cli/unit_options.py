@@ -12,7 +12,7 @@ from derain.jobs.workers import processes
 from derain.recordings.posed import with_poses
 from derain.sources.method import Method
 from derain.sources.source import Source
-from derain.sources.units import BLOCK, Division, spans_of
+from derain.sources.units import BLOCK, Division, units_of
 from derain.system.cores import threads_of
 from derain.system.memory import total_memory
 from derain.system.notices import warn
@@ -179,7 +179,7 @@ def method_and_workers(
         source: The scans.
         arguments: The options.
     """
-    workers = workers_of(arguments, lambda: len(spans_of(source, method, arguments.block)))
+    workers = workers_of(arguments, lambda: len(units_of(source, method, arguments.block)))
     return (remake() if share_threads(arguments, workers) else method), workers
 
 

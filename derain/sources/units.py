@@ -152,7 +152,7 @@ def units_of(source: Sequence[Frame], method: Method | None, block: int = BLOCK)
     Returns:
         The units, in the order of the source. A unit has the key of its first frame for an id.
     """
-    return [_unit(*span) for span in spans_of(source, method, block)]
+    return [unit for each in recordings_of(source) for unit in _units_of(each, method, block)]
 
 
 def whole(source: Sequence[Frame]) -> FrameUnit:
@@ -191,21 +191,13 @@ def folder_of_paths(source: Sequence[Frame], *places: Place) -> Path | None:
     return None if all(path.is_absolute() for path in paths) else Path.cwd()
 
 
-# Frames of a recording, where a unit of it begins and ends, and what the method sees around it.
-Span = tuple[Sequence[Frame], int, int, Window]
-
-
-def spans_of(source: Sequence[Frame], method: Method | None, block: int) -> list[Span]:
-    """Begin and end of each unit of a source; arguments as for :func:`units_of`."""
-    return [span for each in recordings_of(source) for span in _spans_of(each, method, block)]
-
-
-def _spans_of(recording: Sequence[Frame], method: Method | None, block: int) -> Iterator[Span]:
+def _units_of(recording: Sequence[Frame], method: Method | None, block: int) -> Iterator[FrameUnit]:
+    """The units of one recording."""
     window = Window() if method is None else method.depends_on(recording)
     if window is None or isinstance(recording[0], BagFrame | StoredBag):
         window, block = Window(), len(recording)
     for begin in range(0, len(recording), block):
-        yield recording, begin, begin + block, window
+        yield _unit(recording, begin, begin + block, window)
 
 
 def _unit(recording: Sequence[Frame], begin: int, end: int, window: Window) -> FrameUnit:
