@@ -21,7 +21,7 @@ from derain.export.runtimes.session import (
 )
 from derain.scan import Array, Bools, Float32s, Scan
 from derain.sources.judgement import Judgement
-from derain.sources.scan_method import ScanMethod
+from derain.sources.method import ScanMethod
 from derain.system.cores import threads_of
 from derain.system.stopwatch import Stopwatch
 from derain.views.probability import probability_of_rain

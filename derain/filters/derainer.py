@@ -9,7 +9,7 @@ from derain.errors import InputError
 from derain.filters.point_filter import PointFilter, rows_of
 from derain.scan import Array, Bools, Scan
 from derain.sources.judgement import Judgement
-from derain.sources.scan_method import ScanMethod
+from derain.sources.method import ScanMethod
 from derain.system.cores import threads_of
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates

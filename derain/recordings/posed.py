@@ -7,13 +7,13 @@ import numpy as np
 
 from derain.errors import InputError
 from derain.files.reading import reading
+from derain.sources.bag_frame import UnreadableBag
 from derain.sources.frame import Frame
 from derain.sources.recordings import recordings_of
 from derain.sources.records import poses_along
 from derain.sources.source import Frames, Source
 from derain.sources.stored_frame import StoredBag
 from derain.sources.trajectory import read_trajectory
-from derain.sources.unreadable_bag import UnreadableBag
 
 # What stands for the poses of a sensor at rest.
 STANDING = "standing"

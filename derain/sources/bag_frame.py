@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
+from typing import Any, NoReturn
 
 from derain.bags.bag import Bag
 from derain.bags.cloud_topic import CloudTopic, damaged_cloud
@@ -81,6 +82,23 @@ class BagFrame(FileFrame):
         place = [self.clouds.topic.name, str(self.cloud_number)]
         stamps = map(stamp_of, files_of(self.clouds.bag.path))
         return " ".join([*stamps, *place]) + self._label_stamp()
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class UnreadableBag(FileFrame):
+    """Stands for all clouds of a bag. What reads them, or asks for their labels, raises the error.
+
+    Attributes:
+        error: Why they cannot be listed.
+    """
+
+    error: InputError
+    suffix = ""  # there is no file whose format an output could keep
+
+    def _fail(self, *_: Any, **__: Any) -> NoReturn:
+        raise self.error
+
+    read = read_label = count_points = fingerprint = require_labels = _fail
 
 
 def bag_frames(path: Path, labelled: bool = False, prefix: str = "") -> list[BagFrame]:

@@ -16,13 +16,12 @@ from derain.example import or_example
 from derain.files import DEFAULT_COLUMNS
 from derain.files.names import scan_stem
 from derain.scan import Scan
-from derain.sources.bag_frame import bag_frames
+from derain.sources.bag_frame import UnreadableBag, bag_frames
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame, MemoryFrame
 from derain.sources.records import Records
 from derain.sources.search import recordings_below, scans_or_bags
 from derain.sources.source import Frames, Source
-from derain.sources.unreadable_bag import UnreadableBag
 from derain.stores.url import is_url, paths_of
 
 # Returns the clouds of a bag, or those at a path into one. Arguments: the path; whether to read

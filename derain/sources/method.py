@@ -1,10 +1,11 @@
-"""The base class of methods that judge the frames of a recording."""
+"""The base classes of methods, which judge the frames of a recording, or each scan by itself."""
 
 import json
 import sys
 import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import cached_property
 from hashlib import sha256
 from typing import Any, ClassVar
@@ -153,6 +154,41 @@ class Method(ABC):
 
         Texts, finite numbers, true, false, or nothing; or lists and mappings of these.
         """
+
+
+class ScanMethod(Method):
+    """A method that sees one scan at a time, and answers for it at once: a model or a filter."""
+
+    @abstractmethod
+    def judge(self, points: Scan | Array, stopwatch: Stopwatch | None = None) -> Judgement:
+        """Judges a scan.
+
+        Args:
+            points: A Scan, or numbers of which the first columns are x, y, z in metres in the
+                sensor's frame, then intensity.
+            stopwatch: Takes the times of the stages view, network and back.
+        """
+
+    def depends_on(self, recording: Sequence[Frame]) -> Window:
+        """No scans but the one that it judges."""
+        return self.window
+
+    def push(self, frame: Frame | Scan | Array, stopwatch: Stopwatch | None = None) -> Judgement:
+        """Judges the next frame of a recording, at once.
+
+        Args:
+            frame: A frame, which is read; or points, as for :meth:`judge`.
+            stopwatch: Takes the times of the stages read, view, network and back.
+
+        Raises:
+            InputError: A frame that cannot be read or judged.
+        """
+        stopwatch = stopwatch or Stopwatch()
+        if not isinstance(frame, Frame):
+            return self.judge(frame, stopwatch)
+        with stopwatch.stage("read"):
+            scan = frame.read()
+        return replace(self.judge(scan, stopwatch), frame=frame)
 
 
 def _stack_level_of_caller() -> int:
