@@ -9,8 +9,8 @@ from typing import Any
 
 from derain.errors import InputError
 
-# Where Linux has the limit of a container's processor time: how many microseconds of it in how many;
-# no limit is ``max``.
+# Where Linux has the limit of a container's processor time: how many microseconds of it in how
+# many; no limit is ``max``.
 # Source: Linux, Documentation/admin-guide/cgroup-v2.rst.
 GROUP_LIMIT = Path("/sys/fs/cgroup/cpu.max")
 
