@@ -50,15 +50,6 @@ class PointHeader(Protocol):
         """The same of some points only, by their row numbers or a bool mask of shape (N,)."""
 
 
-@runtime_checkable
-class PartialHeader(Protocol):
-    """A header that lists the parts of its file that are not in the scan, so are not written."""
-
-    @property
-    def left_out(self) -> tuple[str, ...]:
-        """Their names; none where nothing is lost."""
-
-
 @dataclass(frozen=True, eq=False)
 class Scan:
     """One point cloud, in the order of its file; rows are never dropped or reordered.
@@ -87,7 +78,8 @@ class Scan:
         name: Source of the scan, for messages.
         header: The content of the file besides its columns, such as the encoding of a PCD. Only the
             writer of the same format looks into it. One that speaks of single points is a
-            PointHeader, one with parts that are not written a PartialHeader.
+            PointHeader; one of a file with parts that are not written has their names as
+            ``left_out``, a tuple.
 
     Raises:
         InputError: Columns of different lengths, of another shape or without numbers; class ids
@@ -171,6 +163,11 @@ class Scan:
 
     def __len__(self) -> int:
         return len(self.xyz)
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Names of the parts of its file that are not written with it; mostly none."""
+        return getattr(self.header, "left_out", ())
 
     @cached_property  # the range view, its channel and the metrics ask for it in turn
     def range(self) -> Float32s:

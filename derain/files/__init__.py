@@ -16,7 +16,7 @@ from derain.files.format import FORMATS, format_of
 from derain.files.frame_times import METADATA
 from derain.files.names import is_compressed, scan_suffix
 from derain.files.reading import reading
-from derain.scan import Array, PartialHeader, Scan
+from derain.scan import Array, Scan
 
 __all__ = ["DEFAULT_COLUMNS", "count_points", "find_scans", "read_scan", "write_scan"]
 
@@ -88,9 +88,8 @@ def write_scan(path: Path | str, scan: Scan | Array) -> None:
     """
     path, scan = Path(path), Scan.of(scan)
     content = format_of(path).encode(path, scan)
-    if isinstance(scan.header, PartialHeader) and scan.header.left_out:
-        parts = ", ".join(scan.header.left_out)
-        lack = f"the written copy of {scan.name} lacks its {parts}"
+    if scan.left_out:
+        lack = f"the written copy of {scan.name} lacks its {', '.join(scan.left_out)}"
         warnings.warn(lack, ScanWarning, stacklevel=2)
     with replacing(path) as temporary:
         temporary.write_bytes(compressed(content) if is_compressed(path) else content)

@@ -2,11 +2,10 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
-from derain.scan import FEWEST_ALIKE, Bools, PartialHeader, Scan
+from derain.scan import FEWEST_ALIKE, Bools, Scan
 from derain.views.full_scale import FULL_SCALES
 
 # Intensities this many times off the training data's are of another unit.
@@ -41,18 +40,6 @@ class ScanIssue:
     detail: str
 
 
-class ScanChecker(Protocol):
-    """A method of judging scans that can check beforehand whether a scan suits it."""
-
-    def issues(self, scan: Scan) -> Iterator[ScanIssue]:
-        """Warnings about a scan before it is judged.
-
-        Args:
-            scan: The scan, its intensities in the unit of the method. One without a point that can
-                be judged is warned of elsewhere.
-        """
-
-
 def missing_channels(scan: Scan, fill_value: Mapping[str, float], data: str) -> Iterator[ScanIssue]:
     """Yields an issue for each channel of a model that a scan lacks.
 
@@ -64,8 +51,8 @@ def missing_channels(scan: Scan, fill_value: Mapping[str, float], data: str) -> 
     if not scan.valid.any():
         return
     for name, mean in fill_value.items():
-        lack, detail = _lack(scan) if name == "intensity" else (f"no {name}", f"no {name}")
-        yield ScanIssue(lack, f"{detail}: replaced by the mean of {data}, {mean:.3g}")
+        lack = _lack(scan) if name == "intensity" else f"no {name}"
+        yield ScanIssue(lack, f"{lack}: replaced by the mean of {data}, {mean:.3g}")
 
 
 def missing_intensity(
@@ -79,8 +66,8 @@ def missing_intensity(
         consequence: Its effect on the method.
     """
     if scan.measured_intensity is None and scan.valid.any():
-        lack, detail = _lack(scan)
-        yield ScanIssue(lack, f"{detail}: {consequence}")
+        lack = _lack(scan)
+        yield ScanIssue(lack, f"{lack}: {consequence}")
 
 
 def intensity_unlike_training(scan: Scan, mean: float, unit: str, data: str) -> Iterator[ScanIssue]:
@@ -184,20 +171,16 @@ def no_points(scan: Scan) -> Iterator[ScanIssue]:
 
 def left_out(scan: Scan) -> Iterator[ScanIssue]:
     """Yields an issue if a scan's file has parts that are not written with the cleaned scan."""
-    if isinstance(scan.header, PartialHeader) and scan.header.left_out:
-        detail = f"the cleaned file is without its {', '.join(scan.header.left_out)}"
+    if scan.left_out:
+        detail = f"the cleaned file is without its {', '.join(scan.left_out)}"
         yield ScanIssue("parts of the file that are not written", detail)
 
 
-def _lack(scan: Scan) -> tuple[str, str]:
-    """Kind and detail of what a scan without a measured intensity has instead."""
+def _lack(scan: Scan) -> str:
+    """What a scan without a measured intensity lacks."""
     if scan.intensity is None:
-        return "no intensity", "no intensity"
-    values = scan.intensity[scan.valid]
-    if values.min() == values.max():
-        alike = f"intensity {values[0]:g} at every point, so that it was not measured"
-        return "intensity not measured", alike
-    return "intensity not measured", "no intensity is a possible value of a sensor"
+        return "no intensity"
+    return "intensity not measured (one value at every point, or none that is possible)"
 
 
 def _other_unit(smaller: bool) -> str:

@@ -31,7 +31,6 @@ from derain.filters.derainer import CANDIDATES
 from derain.scan import Array, Bools, Scan
 from derain.spec import Spec
 from derain.system.stopwatch import Stopwatch
-from derain.views.scan_issues import ScanChecker
 
 # Returns which points of a scan are rain, bool (N,). Takes the scan, and a stopwatch for its stages
 # where they are to be timed.
@@ -63,7 +62,7 @@ class BenchEntry:
         ready: Makes the method, with a number of threads.
         facts: File or parameters, from which the bench can be repeated.
         filter: The filter, where it is one: filters share one search for neighbours.
-        spec_or_filter: Checks whether a scan suits the method: a model's Spec or a filter.
+        spec_or_filter: Checks whether a scan suits the method: a model's Spec, a filter or a rule.
         runtime: The runtime of a model.
         usual: Makes the same model in onnxruntime in float32, where it has another runtime.
         learnt: Fingerprint of what a baseline has learnt, where its facts do not hold it.
@@ -74,7 +73,7 @@ class BenchEntry:
     ready: Callable[[int], TimedMethod]
     facts: dict[str, Any] = field(default_factory=dict)
     filter: FilterDerainer | None = None
-    spec_or_filter: ScanChecker | None = None
+    spec_or_filter: Spec | PointFilter | IntensityRule | None = None
     runtime: Runtime = field(default_factory=Runtime)
     usual: Callable[[int], TimedMethod] | None = None
     learnt: str = ""
