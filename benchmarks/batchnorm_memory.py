@@ -41,8 +41,6 @@ def remembered_intensity(
     Returns:
         Both in the unit of that card.
     """
-    assert normalised_as.mean is not None
-    assert normalised_as.std is not None
     name = {key.removeprefix("convs.0."): value.numpy() for key, value in state_dict.items()}
     weight, distance = name["conv1.weight"].astype(np.float64), name["conv1.dw"]
     # Float64 (32, 5): what a unit makes of a change that all neighbours have in common. One is
@@ -59,7 +57,7 @@ def remembered_intensity(
     columns = np.stack([*moments, alone, apart], axis=1)
     variance = _relative_least_squares(columns, name["bn1.running_var"])
     shared, own = variance[pairs.index((INTENSITY, INTENSITY))], variance[len(pairs)]
-    scale, offset = normalised_as.std[INTENSITY], normalised_as.mean[INTENSITY]
+    offset, scale = normalised_as.statistics("intensity")
     return float(offset + scale * mean[INTENSITY]), float(scale * np.sqrt(shared + own))
 
 

@@ -6,7 +6,7 @@ import lightning
 import numpy as np
 from torch.utils.data import DataLoader
 
-from derain.cards.card import CHANNELS_OF_STATISTICS, DataCard
+from derain.cards.card import DataCard
 from derain.datamodules.loader import scan_loader
 from derain.datamodules.order import Draws
 from derain.datamodules.scan_data import Loading, Part, ScanData, with_needed_labels
@@ -70,7 +70,7 @@ class ScanDataModule(ScanData, lightning.LightningDataModule):
         Raises:
             InputError: A scan that cannot be read, or a column that none of them has.
         """
-        extra = [name for name in columns if name not in self.card.extra]
+        extra = [name for name in columns if name not in self.card.moments]
         if extra or not self.card.has_statistics:
             scans = self.training_scans(MOST_MEASURED, columns, labelled)
             self.card = with_statistics(self.card, scans, extra)
@@ -162,11 +162,5 @@ def with_statistics(card: DataCard, scans: Iterable[Scan], extra: Sequence[str] 
     variance = squares / np.maximum(count, 1) - mean**2
     # A constant channel is not divided by 0.
     std = np.sqrt(np.where(variance > ROUNDING * mean**2, variance, 1.0))
-    statistics = dict(zip(channels, zip(mean.tolist(), std.tolist(), strict=True), strict=True))
-    return card.completed(
-        mean=tuple(statistics[name][0] for name in CHANNELS_OF_STATISTICS),
-        std=tuple(statistics[name][1] for name in CHANNELS_OF_STATISTICS),
-        range=statistics["range"],
-        extra={name: statistics[name] for name in extra},
-        rain_share=rain / max(judged, 1) if labelled else None,
-    )
+    moments = dict(zip(channels, zip(mean.tolist(), std.tolist(), strict=True), strict=True))
+    return card.completed(moments, rain / max(judged, 1) if labelled else None)

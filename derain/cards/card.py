@@ -11,7 +11,7 @@ from derain.cards.layout import Layout
 from derain.errors import InputError
 from derain.files.documents import Entry, packaged, packaged_or_own, shown
 from derain.scan import LARGEST_ID, Bools, Scan
-from derain.views.channels import UNITS
+from derain.views.channels import UNITS, USUAL_CHANNELS
 
 Parsed = TypeVar("Parsed")
 
@@ -20,8 +20,11 @@ Parsed = TypeVar("Parsed")
 AutoDetect = Literal["nothing", "classes", "rain"]
 AUTO_DETECTIONS: tuple[AutoDetect, ...] = get_args(AutoDetect)
 
-# What mean and std are of, in their order.
+# What mean and std of a file are of, in their order.
 CHANNELS_OF_STATISTICS = ("x", "y", "z", "intensity")
+
+# Mean and standard deviation.
+Moments = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -42,10 +45,9 @@ class DataCard:
             on nor measured by.
         licence: Licence of the data.
         intensity_unit: Unit or span of its intensities, such as ``0..255``.
-        mean: Mean of x, y, z (metres) and intensity over the training points; None if not known.
-        std: Their standard deviations; None if not known.
-        range: Mean and standard deviation of range in metres; None if not known.
-        extra: Mean and standard deviation of further channels, by name, such as ``doppler``.
+        moments: Mean and standard deviation of channels over the training points, by name, as far
+            as they are known: ``x``, ``y``, ``z`` and ``range`` in metres, ``intensity``, and
+            further ones, such as ``doppler``.
         rain_share: Share of rain among the training points; None if not known.
         simulated: True if its rain or snow is simulated; scores on it are labelled so.
         deduplicate: True if results on it count points at one position once, as those of a sensor
@@ -65,10 +67,7 @@ class DataCard:
     unknown: tuple[int, ...] = ()
     licence: str = "not stated"
     intensity_unit: str = "not stated"
-    mean: tuple[float, ...] | None = None
-    std: tuple[float, ...] | None = None
-    range: tuple[float, ...] | None = None
-    extra: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    moments: Mapping[str, Moments] = field(default_factory=dict)
     rain_share: float | None = None
     simulated: bool = False
     deduplicate: bool = False
@@ -85,31 +84,25 @@ class DataCard:
 
     @property
     def has_statistics(self) -> bool:
-        """True where the statistics of every channel and the rain share are known."""
-        return None not in (self.mean, self.std, self.range, self.rain_share)
+        """True where the statistics of every usual channel and the rain share are known."""
+        return self.rain_share is not None and self.moments.keys() >= set(USUAL_CHANNELS)
 
-    def statistics(self, channel: str) -> tuple[float, float]:
+    def statistics(self, channel: str) -> Moments:
         """Mean and standard deviation of a channel over the training points.
 
         Args:
-            channel: ``x``, ``y``, ``z``, ``intensity``, ``range``, or one of the extra ones.
+            channel: Its name.
 
         Raises:
             InputError: They are not known.
         """
-        if channel == "range" and self.range is not None:
-            mean, std = self.range
-            return mean, std
-        if channel in CHANNELS_OF_STATISTICS and self.mean is not None and self.std is not None:
-            number = CHANNELS_OF_STATISTICS.index(channel)
-            return self.mean[number], self.std[number]
-        if channel in self.extra:
-            return self.extra[channel]
-        raise InputError(
-            self.name,
-            f"the data card has no statistics of {channel}",
-            "Add mean and std (of x, y, z, intensity), range, or extra (by name, mean and std).",
-        )
+        if channel not in self.moments:
+            raise InputError(
+                self.name,
+                f"the data card has no statistics of {channel}",
+                "Add mean and std (of x, y, z, intensity), range, or extra (by name, both).",
+            )
+        return self.moments[channel]
 
     def unit(self, channel: str) -> str:
         """Unit of a channel."""
@@ -145,18 +138,14 @@ class DataCard:
 
     def normalised_as(self, other: "DataCard") -> "DataCard":
         """The same card with the input's statistics of another one, and the unit they are in."""
-        names = ("intensity_unit", "mean", "std", "range", "extra")
-        return replace(self, **{name: getattr(other, name) for name in names})
+        return replace(self, intensity_unit=other.intensity_unit, moments=other.moments)
 
     def completed(
-        self, extra: Mapping[str, tuple[float, float]] = {}, **statistics: Any
+        self, moments: Mapping[str, Moments], rain_share: float | None = None
     ) -> "DataCard":
         """The same card with statistics in place of those that it lacks."""
-        return replace(
-            self,
-            extra={**extra, **self.extra},
-            **{name: value for name, value in statistics.items() if getattr(self, name) is None},
-        )
+        share = rain_share if self.rain_share is None else self.rain_share
+        return replace(self, moments={**moments, **self.moments}, rain_share=share)
 
     def _of_classes(self, scan: Scan, ids: tuple[int, ...]) -> Bools:
         if scan.label is None:
@@ -178,7 +167,9 @@ def load_card(name: str | Path) -> DataCard:
         ['falling-snow']
 
     Args:
-        name: Name of a packaged card, or a YAML file with the attributes of :class:`DataCard`.
+        name: Name of a packaged card, or a YAML file with the attributes of :class:`DataCard`. In
+            place of ``moments`` it has ``mean`` and ``std``, each of x, y, z and intensity, and, as
+            mean and standard deviation, ``range``, and by name ``extra``.
 
     Raises:
         InputError: No such card, or a file that is not one.
@@ -207,7 +198,13 @@ def load_card(name: str | Path) -> DataCard:
     found = document.record(parsers, required=["name", "classes", "rain"])
     if "folders_tell" in found:
         found["auto_detect"] = found.pop("folders_tell")
-    card = DataCard(**found)
+    moments = found.pop("extra", {})
+    mean, std, of_range = (found.pop(name, None) for name in ("mean", "std", "range"))
+    if of_range is not None:
+        moments["range"] = of_range
+    if mean is not None and std is not None:
+        moments |= zip(CHANNELS_OF_STATISTICS, zip(mean, std, strict=True), strict=True)
+    card = DataCard(**found, moments=moments)
     members = document.members()
     if len(set(card.classes.values())) < len(card.classes):
         raise members["classes"].fault("two classes have the same name", "Give each its own.")

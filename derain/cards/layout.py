@@ -38,7 +38,7 @@ class Layout:
             InputError: Something that is not a layout.
         """
         names = dict.fromkeys(("sequences", "scans", "labels", "lidar"), _folder)
-        return cls(**entry.record(names, required=()))
+        return cls(**entry.record(names))
 
     def label_of(self, scan: Path) -> Path:
         """Path of the labels of a scan in the folder of scans."""

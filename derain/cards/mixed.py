@@ -6,12 +6,9 @@ from math import sqrt
 
 import numpy as np
 
-from derain.cards.card import CHANNELS_OF_STATISTICS, DataCard
+from derain.cards.card import DataCard, Moments
 from derain.errors import InputError
 from derain.scan import Ints
-
-# Mean and standard deviation.
-Moments = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -109,22 +106,14 @@ def with_pooled_statistics(
         cards: The cards of the data sets.
         shares: Share of each among the scans that are drawn, of 1 in all.
     """
-    extra = [name for name in cards[0].extra if all(name in card.extra for card in cards)]
-    known = all(card.mean and card.std and card.range for card in cards)
-    channels = (*CHANNELS_OF_STATISTICS, "range") if known else ()
     pooled = {
-        name: _pooled([card.statistics(name) for card in cards], shares)
-        for name in (*channels, *extra)
+        name: _pooled([card.moments[name] for card in cards], shares)
+        for name in cards[0].moments
+        if all(name in card.moments for card in cards)
     }
     rain = [card.rain_share for card in cards if card.rain_share is not None]
-    return replace(
-        mixed,
-        mean=tuple(pooled[name][0] for name in CHANNELS_OF_STATISTICS) if known else None,
-        std=tuple(pooled[name][1] for name in CHANNELS_OF_STATISTICS) if known else None,
-        range=pooled.get("range"),
-        extra={name: pooled[name] for name in extra},
-        rain_share=float(np.dot(rain, shares)) if len(rain) == len(cards) else None,
-    )
+    rain_share = float(np.dot(rain, shares)) if len(rain) == len(cards) else None
+    return replace(mixed, moments=pooled, rain_share=rain_share)
 
 
 def _pooled(moments: Sequence[Moments], shares: Sequence[float]) -> Moments:

@@ -43,7 +43,7 @@ def written(card_file: Path, *missing: str, **changes: Any) -> DataCard:
 def test_a_packaged_card_can_be_read(name) -> None:
     card = load_card(name)
     assert set(card.rain) <= set(card.classes)
-    assert card.std is None or min(card.std) > 0
+    assert all(std > 0 for _, std in card.moments.values())
     sequences = [sequence for part in card.split.values() for sequence in part]
     assert len(set(sequences)) == len(sequences)
 
@@ -73,10 +73,10 @@ def test_a_card_of_ones_own_holds_what_is_in_its_file(card_file) -> None:
         name="our yard",
         classes={0: "ground", 3: "rain", 4: "spray"},
         rain=(3, 4),
-        mean=(1.0, 2.0, 3.0, 4.0),
-        std=(5.0, 6.0, 7.0, 8.0),
-        range=(9.0, 10.0),
-        extra={"doppler": (-0.5, 2.0), "ring": (31.5, 18.4)},
+        moments={
+            **{"x": (1.0, 5.0), "y": (2.0, 6.0), "z": (3.0, 7.0), "intensity": (4.0, 8.0)},
+            **{"range": (9.0, 10.0), "doppler": (-0.5, 2.0), "ring": (31.5, 18.4)},
+        },
         rain_share=0.25,
         split={"train": ("00", "010"), "test": ("008",)},
     )
@@ -90,12 +90,12 @@ def test_a_card_of_an_earlier_version_keeps_its_automatic_detection(card_file) -
 def test_a_card_is_completed_by_the_statistics_that_it_lacks(card_file, missing) -> None:
     card = written(card_file, missing)
     assert not card.has_statistics
-    statistics = {"mean": (0.0,) * 4, "std": (1.0,) * 4, "range": (9.0, 9.0), "rain_share": 0.5}
-    whole = card.completed(extra={"rcs": (1.0, 2.0), "ring": (0.0, 1.0)}, **statistics)
+    measured = dict.fromkeys(("x", "y", "z", "intensity", "range", "rcs", "ring"), (0.0, 1.0))
+    whole = card.completed(measured, 0.5)
     assert whole.has_statistics
     # What it knew already stays.
-    extra = {"doppler": (-0.5, 2), "ring": (31.5, 18.4), "rcs": (1, 2)}
-    assert whole == replace(card, extra=extra, **{missing: statistics[missing]})
+    assert whole.moments == {**measured, **card.moments}
+    assert whole.rain_share == (0.5 if missing == "rain_share" else 0.25)
 
 
 def test_every_channel_has_its_statistics_and_its_unit(card_file) -> None:
@@ -158,4 +158,4 @@ def test_a_card_takes_the_normalisation_of_another_and_stays_itself() -> None:
     both = rehearse.normalised_as(wads)
     for channel in ("x", "y", "z", "intensity", "range"):
         assert both.statistics(channel) == wads.statistics(channel)
-    assert replace(both, mean=None, std=None, range=None) == rehearse
+    assert replace(both, moments={}) == rehearse

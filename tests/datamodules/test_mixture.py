@@ -89,10 +89,11 @@ def test_statistics_are_those_of_a_scan_that_is_drawn() -> None:
     }
     drawn = np.concatenate([points["snow"]] * 2 + [points["spray"]] * 3)  # 8 scans and 24
     drawn = drawn.astype(np.float64)
-    np.testing.assert_allclose(data.card.mean, drawn.mean(axis=0), rtol=1e-5, atol=1e-6)
-    np.testing.assert_allclose(data.card.std, drawn.std(axis=0), rtol=1e-5)
-    own = [SNOW.completed(rain_share=13 / 40).rain_share, 14 / 27]
-    assert data.card.rain_share == pytest.approx(0.25 * own[0] + 0.75 * own[1])
+    pooled = [data.card.statistics(name) for name in ("x", "y", "z", "intensity")]
+    mean, std = zip(*pooled, strict=True)
+    np.testing.assert_allclose(mean, drawn.mean(axis=0), rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(std, drawn.std(axis=0), rtol=1e-5)
+    assert data.card.rain_share == pytest.approx(0.25 * 13 / 40 + 0.75 * 14 / 27)
 
 
 def test_each_part_is_read_in_its_own_unit() -> None:
