@@ -31,8 +31,6 @@ def reading(path: Path, *damage: type[Exception]) -> Iterator[None]:
         raise InputError(path, reason, remedy) from error
     except FileNotFoundError as error:
         raise InputError(path, "there is no such file", "Check the path.") from error
-    except IsADirectoryError as error:
-        raise InputError(path, "is a folder", "Name a file.") from error
     except OSError as error:
         reason = f"cannot be read ({error.strerror or error})"
         raise InputError(path, reason, "Check the file and its permissions.") from error
@@ -68,10 +66,8 @@ def file_size(path: Path) -> int:
         OSError: There is no file, or its folder may not be searched.
     """
     status = path.stat()
-    if stat.S_ISDIR(status.st_mode):
-        raise IsADirectoryError
     if not stat.S_ISREG(status.st_mode):
-        raise InputError(path, "is a pipe or a device", "Name a file.")
+        raise InputError(path, "is a folder, a pipe or a device", "Name a file.")
     return status.st_size
 
 

@@ -73,10 +73,8 @@ class SphericalGrid:
     def __post_init__(self) -> None:
         right, left = self.azimuth
         size = f"{self.rows} rows by {self.columns} columns"
-        if self.rows < 1 or self.columns < 1:
-            raise _wrong(size, "Give at least one of each.")
-        if self.rows * self.columns > MOST_PIXELS:
-            raise _wrong(size, f"Give at most {MOST_PIXELS:,} pixels.")
+        if min(self.rows, self.columns) < 1 or self.rows * self.columns > MOST_PIXELS:
+            raise _wrong(size, f"Give at least one of each, and at most {MOST_PIXELS:,} pixels.")
         if not (-FULL_CIRCLE <= right < left <= right + FULL_CIRCLE):
             reason = f"azimuth from {right:g} to {left:g} degrees"
             raise _wrong(reason, "Give the right bound, then the left, at most 360 degrees apart.")

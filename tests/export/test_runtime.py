@@ -143,7 +143,7 @@ def test_the_threshold_is_that_of_the_file(derainer, changed_model) -> None:
     ("given_", "reason"),
     [
         ("none.onnx", r"none\.onnx: there is no such file"),
-        (".", "is a folder"),
+        (".", "cannot be read .Is a directory"),
         ("dror", "derain.FilterDerainer"),
         (DROR(), "derain.FilterDerainer"),
         (np.zeros((5, 4)), "path of an ONNX file"),
