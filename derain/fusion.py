@@ -7,7 +7,7 @@ import numpy as np
 import small_gicp
 
 from derain.errors import InputError
-from derain.files.extrinsics import Extrinsics
+from derain.files.extrinsics import moved
 from derain.scan import Array, Float32s, Floats, Ints, Scan
 from derain.system.cores import usable_cores
 from derain.views.morton import distinct_rows
@@ -57,7 +57,7 @@ def nearest_in_time(times: Floats, among: Floats, within: float) -> Ints:
 def fuse(
     lidar: Scan,
     radar: Scan,
-    extrinsics: Extrinsics,
+    extrinsics: Floats,
     label_within: float = LABEL_WITHIN,
     channels: Sequence[str] = (),
 ) -> Scan:
@@ -67,7 +67,7 @@ def fuse(
         lidar: The LiDAR's scan. With labels, the fused cloud has labels.
         radar: The radar's frame. Its labels are kept; if it has none, each of its points gets that
             of the nearest LiDAR point.
-        extrinsics: Takes points of the radar into the LiDAR's frame.
+        extrinsics: Takes points of the radar into the LiDAR's frame, float64 (4, 4), metres.
         label_within: Largest distance of a LiDAR point's label, metres.
         channels: Fields of the radar frame to carry along, such as doppler and rcs.
 
@@ -132,12 +132,12 @@ def transfer_labels(labelled: Scan, xyz: Float32s, within: float = LABEL_WITHIN)
     return label
 
 
-def _moved(scan: Scan, extrinsics: Extrinsics) -> Scan:
+def _moved(scan: Scan, motion: Floats) -> Scan:
     # Rows that cannot be judged stay as they are: a missing return, at the origin, would become a
     # point where the sensor is mounted.
     valid = scan.valid
     xyz = scan.xyz.copy()
-    xyz[valid] = extrinsics(xyz[valid])
+    xyz[valid] = moved(xyz[valid], motion)
     return replace(scan, xyz=xyz)
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.files import read_scan, write_scan
-from derain.files.extrinsics import Extrinsics
+from derain.files.extrinsics import motion_of_pose, moved
 from derain.fusion import (
     LABEL_WITHIN,
     NO_DETECTIONS,
@@ -22,8 +22,8 @@ from derain.fusion import (
 )
 from derain.scan import Scan
 
-PLACE = Extrinsics.of_pose(1.5, -0.3, -0.7, 1, -2, 3)
-HERE = Extrinsics(np.eye(4))
+PLACE = motion_of_pose(1.5, -0.3, -0.7, 1, -2, 3)
+HERE = np.eye(4)
 
 # Multiples of a quarter are exact, so that ties are ties.
 quarters = st.integers(-20, 20).map(lambda number: number / 4)
@@ -54,7 +54,7 @@ def test_the_lidar_comes_first_and_both_keep_their_order() -> None:
     fused = fuse(lidar, radar, PLACE)
     assert fused.radar.tolist() == [False] * 100 + [True] * 30
     np.testing.assert_array_equal(fused.xyz[:100], lidar.xyz)
-    np.testing.assert_array_equal(fused.xyz[100:], PLACE(radar.xyz))
+    np.testing.assert_array_equal(fused.xyz[100:], moved(radar.xyz, PLACE))
     np.testing.assert_array_equal(fused.intensity[:100], lidar.intensity)
     assert (fused.intensity[100:] == 0).all()
     assert fused.label is None

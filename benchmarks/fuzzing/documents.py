@@ -20,7 +20,7 @@ from derain.evaluation.contents import find_sequences
 from derain.evaluation.hard_cases import scene
 from derain.export.methods import read_parameters
 from derain.files.documents import Entry
-from derain.files.extrinsics import read_extrinsics
+from derain.files.extrinsics import moved, read_extrinsics
 from derain.files.frame_times import read_frame_times
 from derain.filters import FILTERS, FilterDerainer, filter_from
 from derain.simulation.arrays import Returns
@@ -185,10 +185,10 @@ def _read_scene(path: Path) -> None:
 
 
 def _read_extrinsics(path: Path) -> None:
-    extrinsics = read_extrinsics(path)
-    rotation = extrinsics.matrix[:3, :3]
+    motion = read_extrinsics(path)
+    rotation = motion[:3, :3]
     assert np.abs(rotation @ rotation.T - np.eye(3)).max() < 0.01
-    assert not np.isnan(extrinsics(scene(40)[:, :3])).any()
+    assert not np.isnan(moved(scene(40)[:, :3], motion)).any()
 
 
 def _read_parameters(path: Path) -> None:

@@ -1,6 +1,5 @@
 """The mounting of a sensor: the transform of its points into another sensor's frame."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,61 +14,67 @@ POSE = ("x", "y", "z", "roll", "pitch", "yaw")
 ROTATION_TOLERANCE = 1e-3
 
 
-@dataclass(frozen=True, eq=False)
-class Extrinsics:
-    """A rigid motion from one sensor's frame (x forward, y left, z up) into another's.
+def motion_of_pose(x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> Floats:
+    """Takes points of a sensor into the frame in which the sensor has a pose.
 
-    Attributes:
+    Args:
+        x: Position of the sensor: ahead, metres.
+        y: To the left, metres.
+        z: Above, metres.
+        roll: Turn about its x axis, degrees, applied first.
+        pitch: About the y axis, degrees; positive looks down.
+        yaw: About the z axis, degrees, applied last; positive looks left.
+
+    Returns:
+        Homogeneous transformation, float64 (4, 4), translation in metres.
+
+    Source: ROS REP 103, fixed-axis roll, pitch, yaw.
+    """
+    cr, cp, cy = np.cos(np.radians([roll, pitch, yaw]))
+    sr, sp, sy = np.sin(np.radians([roll, pitch, yaw]))
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, x],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, y],
+            [-sp, cp * sr, cp * cr, z],
+            [0, 0, 0, 1],
+        ]
+    )
+
+
+def moved(xyz: Float32s, motion: Floats) -> Float32s:
+    """Moves points, float32 (N, 3), metres, by a homogeneous transformation, float64 (4, 4)."""
+    return to_float32(xyz @ motion[:3, :3].T + motion[:3, 3])
+
+
+def check_rigid(matrix: Floats) -> None:
+    """Refuses what is not a rigid motion from one sensor's frame into another's.
+
+    Args:
         matrix: Homogeneous transformation, float64 (4, 4), translation in metres.
 
     Raises:
         ValueError: A matrix that is not rigid.
     """
-
-    matrix: Floats
-
-    def __post_init__(self) -> None:
-        if not (
-            self.matrix.shape == (4, 4)
-            and np.array_equal(self.matrix[3], (0, 0, 0, 1))
-            and np.isfinite(self.matrix).all()
-            and _is_rotation(self.matrix[:3, :3])
-        ):
-            raise ValueError("not a rotation and a translation above the row 0 0 0 1")
-
-    @classmethod
-    def of_pose(
-        cls, x: float, y: float, z: float, roll: float, pitch: float, yaw: float
-    ) -> "Extrinsics":
-        """Takes points of a sensor into the frame in which the sensor has a pose.
-
-        Args:
-            x: Position of the sensor: ahead, metres.
-            y: To the left, metres.
-            z: Above, metres.
-            roll: Turn about its x axis, degrees, applied first.
-            pitch: About the y axis, degrees; positive looks down.
-            yaw: About the z axis, degrees, applied last; positive looks left.
-
-        Source: ROS REP 103, fixed-axis roll, pitch, yaw.
-        """
-        matrix = np.eye(4)
-        matrix[:3, :3] = _rotation(roll, pitch, yaw)
-        matrix[:3, 3] = x, y, z
-        return cls(matrix)
-
-    def __call__(self, xyz: Float32s) -> Float32s:
-        """Moves points, float32 (N, 3), metres."""
-        return to_float32(xyz @ self.matrix[:3, :3].T + self.matrix[:3, 3])
+    if not (
+        matrix.shape == (4, 4)
+        and np.array_equal(matrix[3], (0, 0, 0, 1))
+        and np.isfinite(matrix).all()
+        and _is_rotation(matrix[:3, :3])
+    ):
+        raise ValueError("not a rotation and a translation above the row 0 0 0 1")
 
 
-def read_extrinsics(path: Path) -> Extrinsics:
-    """Reads where a sensor is mounted.
+def read_extrinsics(path: Path) -> Floats:
+    """Reads where a sensor is mounted, as the motion of its points into the other frame.
 
     Args:
         path: A YAML file with the sensor's pose (``x``, ``y``, ``z`` in metres; ``roll``,
             ``pitch``, ``yaw`` in degrees), or with ``matrix``, four rows of four numbers that take
             points of the sensor into the other frame.
+
+    Returns:
+        Homogeneous transformation, float64 (4, 4), translation in metres.
 
     Raises:
         InputError: A file that is missing or has other keys, or a motion that is not rigid.
@@ -77,16 +82,17 @@ def read_extrinsics(path: Path) -> Extrinsics:
     document = Entry.of_yaml(path)
     values = document.members()
     if values.keys() == set(POSE):
-        return Extrinsics.of_pose(**{name: value.number() for name, value in values.items()})
+        return motion_of_pose(**{name: value.number() for name, value in values.items()})
     if values.keys() != {"matrix"}:
         remedy = f"It needs {', '.join(POSE)} (metres, degrees), or matrix (4 rows of 4 numbers)."
         raise document.fault(f"its keys are {', '.join(values)}", remedy)
     matrix = values["matrix"]
-    rows = np.array([row.numbers(4) for row in matrix.items()], np.float64)
+    motion = np.array([row.numbers(4) for row in matrix.items()], np.float64)
     try:
-        return Extrinsics(rows)
+        check_rigid(motion)
     except ValueError as error:
         raise matrix.fault(str(error), "Write a rigid motion, or the sensor's pose.") from error
+    return motion
 
 
 def _is_rotation(matrix: Floats) -> bool:
@@ -95,17 +101,4 @@ def _is_rotation(matrix: Floats) -> bool:
         np.abs(matrix).max() <= 1 + ROTATION_TOLERANCE
         and np.abs(matrix @ matrix.T - np.eye(3)).max() <= ROTATION_TOLERANCE
         and np.linalg.det(matrix) > 0
-    )
-
-
-def _rotation(roll: float, pitch: float, yaw: float) -> Floats:
-    """Turns by roll about x, then pitch about y, then yaw about z, degrees; float64 (3, 3)."""
-    cr, cp, cy = np.cos(np.radians([roll, pitch, yaw]))
-    sr, sp, sy = np.sin(np.radians([roll, pitch, yaw]))
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
     )

@@ -10,7 +10,7 @@ from numpy.random import Generator
 from numpy.typing import ArrayLike
 
 from derain.files.documents import Entry, packaged, packaged_or_own
-from derain.files.extrinsics import Extrinsics
+from derain.files.extrinsics import motion_of_pose
 from derain.scan import Floats, Ints, Scan
 from derain.simulation.arrays import Returns as Returns
 from derain.simulation.classes import TrackClass
@@ -138,7 +138,7 @@ class Sensor(Settings):
     @property
     def mounting(self) -> Floats:
         """Turns points of a scan into the frame of the level sensor, float64 (4, 4)."""
-        return Extrinsics.of_pose(0, 0, 0, *self.tilt, 0).matrix
+        return motion_of_pose(0, 0, 0, *self.tilt, 0)
 
     def _angles(self) -> tuple[Floats, Floats]:
         """Azimuth and inclination of the beams in the sensor's own frame, degrees.

@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike
 from derain.cards.card import load_card
 from derain.files import write_scan
 from derain.files.atomic import replacing, write_text
-from derain.files.extrinsics import POSE, Extrinsics
+from derain.files.extrinsics import POSE, motion_of_pose
 from derain.files.frame_times import FRAME_COLUMNS, METADATA
 from derain.files.labels import write_labels
 from derain.fusion import NO_DETECTIONS, fuse, nearest_in_time
@@ -63,7 +63,7 @@ def write_sequence(folder: Path, campaign: Campaign, name: str) -> None:
     scene, sensor = SimulatedScene.of(campaign, name, scene_generator), campaign.lidar
     times = campaign.times
     beside = [NO_DETECTIONS] * len(times)
-    mounting = Extrinsics(np.eye(4))
+    mounting = np.eye(4)
     if campaign.radar is not None:
         mounting = _write_mounting(folder, campaign.radar, sensor)
         beside = _record_radar(folder, scene, campaign.radar, times, radar_generator)
@@ -85,13 +85,13 @@ def write_sequence(folder: Path, campaign: Campaign, name: str) -> None:
             _write_poses(folder / kind, poses)
 
 
-def _write_mounting(folder: Path, radar: Radar, sensor: Sensor) -> Extrinsics:
+def _write_mounting(folder: Path, radar: Radar, sensor: Sensor) -> Floats:
     """Writes where the radar is, as seen from the LiDAR: right above or below it."""
     pose = dict.fromkeys(POSE, 0.0) | {"z": radar.mounting_height - sensor.mounting_height}
-    mounting, written = Extrinsics.of_pose(**pose), dict[str, Any](pose)
+    mounting, written = motion_of_pose(**pose), dict[str, Any](pose)
     if any(sensor.tilt):
-        mounting = Extrinsics(sensor.mounting.T @ mounting.matrix)
-        written = {"matrix": mounting.matrix.tolist()}
+        mounting = sensor.mounting.T @ mounting
+        written = {"matrix": mounting.tolist()}
     write_text(folder / "extrinsics.yaml", yaml.safe_dump(written, sort_keys=False))
     return mounting
 

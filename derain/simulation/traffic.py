@@ -6,7 +6,7 @@ import numpy as np
 from numpy.random import Generator
 
 from derain.errors import InputError
-from derain.files.extrinsics import POSE, Extrinsics
+from derain.files.extrinsics import POSE, motion_of_pose
 from derain.scan import Floats
 from derain.simulation import objects
 from derain.simulation.objects import Surface
@@ -62,7 +62,7 @@ class Course:
             greatest * generator.uniform(0.5, 1, shape),
             generator.uniform(slowest, fastest, shape),
             generator.uniform(0, 2 * np.pi, shape),
-            Extrinsics.of_pose(0, 0, 0, **turns).matrix,
+            motion_of_pose(0, 0, 0, **turns),
         )
 
     def pose(self, time: float, sensor: Sensor) -> Floats:
@@ -78,8 +78,8 @@ class Course:
         waves = self.amplitude * np.sin(2 * np.pi * self.frequency * time + self.phase)
         place = dict(zip(POSE, waves.sum(axis=1), strict=True))
         place["x"] += self.speed * time
-        vehicle = Extrinsics.of_pose(**place).matrix
-        above = Extrinsics.of_pose(0, 0, sensor.mounting_height, 0, 0, 0).matrix
+        vehicle = motion_of_pose(**place)
+        above = motion_of_pose(0, 0, sensor.mounting_height, 0, 0, 0)
         return np.asarray(vehicle @ above @ self.mounting)
 
 

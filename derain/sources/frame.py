@@ -11,7 +11,7 @@ import numpy as np
 
 from derain.cards.mixed import LabelMap
 from derain.errors import InputError
-from derain.files.extrinsics import Extrinsics
+from derain.files.extrinsics import check_rigid
 from derain.scan import Floats, Ints, Scan
 
 
@@ -164,7 +164,8 @@ class Frame(ABC):
             InputError: A pose that is no rigid motion.
         """
         try:
-            pose = Extrinsics(np.asarray(pose, np.float64)).matrix
+            pose = np.asarray(pose, np.float64)
+            check_rigid(pose)
         except (TypeError, ValueError) as error:
             reason = f"its pose is not rigid ({error})"
             raise InputError(self.name, reason, "Give a rotation and metres.") from error

@@ -19,7 +19,7 @@ import numpy as np
 
 from derain.errors import InputError
 from derain.files.atomic import write_text
-from derain.files.extrinsics import ROTATION_TOLERANCE, Extrinsics
+from derain.files.extrinsics import ROTATION_TOLERANCE, check_rigid
 from derain.files.reading import is_file
 from derain.scan import Floats
 from derain.sources.number_lines import finite_numbers, read_lines, read_numbers
@@ -183,7 +183,7 @@ def _motions(path: Path, rows: Floats) -> Floats:
     motions[:, 3, 3] = 1
     for place, motion in enumerate(motions, 1):
         try:
-            Extrinsics(motion)
+            check_rigid(motion)
         except ValueError as error:
             raise InputError(
                 path, f"pose {place} is not rigid ({error})", "Write the file again."

@@ -8,12 +8,12 @@ import pytest
 
 from derain.evaluation.hard_cases import scene
 from derain.files import read_scan
-from derain.files.extrinsics import Extrinsics
+from derain.files.extrinsics import motion_of_pose, moved
 from derain.files.labels import instance, read_labels, write_labels
 from derain.fusion import UNKNOWN
 from derain.scan import class_ids
 
-PLACE = Extrinsics.of_pose(0.5, 0, -0.7, 0, 0, 90)
+PLACE = motion_of_pose(0.5, 0, -0.7, 0, 0, 90)
 COLUMNS = "x,y,z,doppler,rcs,range,azimuth,elevation,probability,class"
 
 FUSE = [
@@ -55,7 +55,7 @@ def test_each_scan_is_joined_by_the_radar_frame_nearest_in_time(succeed) -> None
         scan = read_scan(Path(f"out/lidar_radar_pcd/{number:06d}.bin"))
         radar = np.empty((0, 4)) if partner is None else scene(12, seed=100 + partner)
         lidar = scene(40, seed=number)
-        np.testing.assert_array_equal(scan.xyz, np.r_[lidar[:, :3], PLACE(radar[:, :3])])
+        np.testing.assert_array_equal(scan.xyz, np.r_[lidar[:, :3], moved(radar[:, :3], PLACE)])
         np.testing.assert_array_equal(scan.intensity, np.r_[lidar[:, 3], radar[:, 3]])
     assert not Path("out/lidar_radar_labels").exists()
 

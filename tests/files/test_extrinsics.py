@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from derain.errors import InputError
-from derain.files.extrinsics import POSE, Extrinsics, read_extrinsics
+from derain.files.extrinsics import POSE, motion_of_pose, moved, read_extrinsics
 
 degrees = st.floats(-360, 360)
 metres = st.floats(-10, 10)
@@ -22,20 +22,20 @@ POINTS = np.random.default_rng(0).uniform(-100, 100, (20, 3)).astype(np.float32)
 def test_a_pose_turns_about_fixed_axes_and_then_moves(pose) -> None:
     rotation = Rotation.from_euler("xyz", pose[3:], degrees=True)  # lower case: fixed axes
     expected = rotation.apply(POINTS.astype(np.float64)) + pose[:3]
-    moved = Extrinsics.of_pose(*pose)(POINTS)
-    assert moved.dtype == np.float32
-    np.testing.assert_allclose(moved, expected, atol=1e-5)
+    points = moved(POINTS, motion_of_pose(*pose))
+    assert points.dtype == np.float32
+    np.testing.assert_allclose(points, expected, atol=1e-5)
 
 
 def test_a_file_holds_a_pose_or_a_matrix(tmp_path) -> None:
     pose = dict(zip(POSE, (0.5, -0.2, -0.7, 1, -2, 30), strict=True))
     (tmp_path / "pose.yaml").write_text(yaml.safe_dump(pose))
     read = read_extrinsics(tmp_path / "pose.yaml")
-    np.testing.assert_array_equal(read.matrix, Extrinsics.of_pose(**pose).matrix)
+    np.testing.assert_array_equal(read, motion_of_pose(**pose))
     # As calibrations are often published: rounded.
-    (tmp_path / "matrix.yaml").write_text(yaml.safe_dump({"matrix": read.matrix.round(4).tolist()}))
+    (tmp_path / "matrix.yaml").write_text(yaml.safe_dump({"matrix": read.round(4).tolist()}))
     rounded = read_extrinsics(tmp_path / "matrix.yaml")
-    np.testing.assert_allclose(rounded.matrix, read.matrix, atol=5e-5)
+    np.testing.assert_allclose(rounded, read, atol=5e-5)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.files.extrinsics import Extrinsics
+from derain.files.extrinsics import motion_of_pose
 from derain.scan import Scan
 
 # Height of the sensor above the road, metres; noise of its ranges; and how far it sees.
@@ -12,7 +12,7 @@ HEIGHT, NOISE, REACH = 1.8, 0.02, 60.0
 
 def motion(x: float = 0.0, y: float = 0.0, yaw: float = 0.0, pitch: float = 0.0) -> NDArray:
     """A rigid motion: ahead and to the left in metres, turns in degrees; (4, 4)."""
-    return Extrinsics.of_pose(x, y, 0, 0, pitch, yaw).matrix
+    return motion_of_pose(x, y, 0, 0, pitch, yaw)
 
 
 def street(generator: np.random.Generator, points: int = 40_000) -> NDArray:

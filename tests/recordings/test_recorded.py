@@ -12,7 +12,7 @@ import pytest
 from derain.errors import InputError, ScanWarning
 from derain.export.recorded import HALF_SOLID, RecordedDerainer, added_log_odds, solidity
 from derain.export.runtime import Derainer
-from derain.files.extrinsics import Extrinsics
+from derain.files.extrinsics import motion_of_pose
 from derain.recordings.rays import RayEvidence
 from derain.scan import Scan
 from derain.sources.file_frame import FileFrame
@@ -69,7 +69,7 @@ def test_without_anything_to_go_by_it_is_the_model(model) -> None:
     jumps = [frames[0], replace(frames[1], sensor_to_world=turned), frames[2]]
     repeats = [replace(frames[0], number=n, key=str(n)) for n in range(3)]
     apart = [replace(frame, sequence=str(n)) for n, frame in enumerate(frames)]
-    askew = frames[1].sensor_to_world @ Extrinsics.of_pose(0, 0, 0, 0, 0, 30).matrix
+    askew = frames[1].sensor_to_world @ motion_of_pose(0, 0, 0, 0, 0, 30)
     wrong = [frames[0], replace(frames[1], sensor_to_world=askew)]
     for recording in (frames[:1], repeats, apart, jumps[:2], wrong):
         for judgement in judged(model, recording):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from derain.files.extrinsics import read_extrinsics
+from derain.files.extrinsics import moved, read_extrinsics
 from derain.files.labels import instance, read_labels
 from derain.scan import Float32s, Floats, class_ids
 from derain.simulation.campaign import Campaign, Drive
@@ -82,13 +82,13 @@ def test_a_merged_cloud_is_the_scan_and_the_radar_frame_nearest_in_time(folder) 
     assert lidar[-1] <= radar[-1]
     mounting = read_extrinsics(folder / EXTRINSICS)
     below = Radar().mounting_height - load_sensor("mems_64").mounting_height
-    assert mounting(np.zeros((1, 3), np.float32)) == pytest.approx(np.array([[0, 0, below]]))
+    assert moved(np.zeros((1, 3)), mounting) == pytest.approx(np.array([[0, 0, below]]))
     for number, time in enumerate(lidar):
         merged = points(folder / f"lidar_radar_pcd/{number:06d}.bin")
         scan = points(folder / f"innoviz/{number:06d}.bin")
         frame = points(folder / f"radar_pcd/{np.abs(radar - time).argmin():06d}.bin")
         assert np.array_equal(merged[: len(scan)], scan)
-        assert np.array_equal(merged[len(scan) :, :3], mounting(frame[:, :3]))
+        assert np.array_equal(merged[len(scan) :, :3], moved(frame[:, :3], mounting))
         assert np.array_equal(merged[len(scan) :, 3], frame[:, 3])
         label = read_labels(folder / f"lidar_radar_labels/{number:06d}.label", len(merged))
         assert set(label) <= set(TrackClass)
@@ -148,8 +148,8 @@ def test_the_radar_stands_above_a_tilted_sensor_as_above_a_level_one(folder, tmp
     extrinsics = read_extrinsics(written(tmp_path, sensor=tilted, radar=Radar()) / EXTRINSICS)
     level = read_extrinsics(folder / EXTRINSICS)
     frame = points(folder / "radar_pcd/000000.bin")[:, :3]
-    turned = extrinsics(frame) @ tilted.mounting[:3, :3].T
-    assert np.allclose(turned, level(frame), atol=1e-4)
+    turned = moved(frame, extrinsics) @ tilted.mounting[:3, :3].T
+    assert np.allclose(turned, moved(frame, level), atol=1e-4)
 
 
 def test_poses_of_a_tilted_sensor_are_those_of_a_level_one_in_its_own_frame(

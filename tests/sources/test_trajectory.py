@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from derain.errors import InputError
-from derain.files.extrinsics import Extrinsics
+from derain.files.extrinsics import motion_of_pose
 from derain.sources.trajectory import (
     LONGEST_GAP,
     TIME_ROUNDING,
@@ -20,7 +20,7 @@ from derain.sources.trajectory import (
 
 degrees = st.floats(-180, 180)
 motions = st.builds(
-    lambda x, y, z, roll, pitch, yaw: Extrinsics.of_pose(x, y, z, roll, pitch, yaw).matrix,
+    lambda x, y, z, roll, pitch, yaw: motion_of_pose(x, y, z, roll, pitch, yaw),
     *3 * [st.floats(-1e4, 1e4)],
     *3 * [degrees],
 )
@@ -30,7 +30,7 @@ TO_CAMERA = np.array([[0, -1, 0, 0.1], [0, 0, -1, -0.2], [1, 0, 0, -0.3], [0, 0,
 
 
 def turned(yaw: float) -> np.ndarray:
-    return Extrinsics.of_pose(0, 0, 0, 0, 0, yaw).matrix[:3, :3]
+    return motion_of_pose(0, 0, 0, 0, 0, yaw)[:3, :3]
 
 
 @given(motions)
