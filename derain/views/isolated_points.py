@@ -94,8 +94,7 @@ class IsolatedPoints(ViewedPoints):
 
     def inputs(self) -> dict[str, Array]:
         """The network's inputs, in its order."""
-        names = ("points", "cell", "distances", "neighbours", "step", "counts")
-        return {name: getattr(self, name) for name in names}
+        return {name: getattr(self, name) for name in (*self.varying, "step", "counts")}
 
 
 @VIEWS.add("isolated_points")

@@ -131,15 +131,12 @@ def _value_type(head: bytes, size: int, columns: Sequence[str]) -> str:
 
 def _odd_share(head: bytes, value: str, columns: Sequence[str]) -> float:
     """Share of the rows with a number that no scan holds; NaN and infinity are in many."""
-    odd = np.zeros(len(head) // (np.dtype(value).itemsize * len(columns)), bool)
-    for name, column in zip(
-        columns, np.frombuffer(head, value).reshape(-1, len(columns)).T, strict=True
-    ):
-        size = np.abs(column[np.isfinite(column)])
-        odd[np.isfinite(column)] |= (size > _reach(name)) | ((size < SMALLEST_VALUE) & (size > 0))
-        if name.lower() in INTENSITY_NAMES:
-            odd |= (column < 0) & (column != SENTINEL)
-    return float(odd.mean())
+    table = np.frombuffer(head, value).reshape(-1, len(columns))
+    size, reach = np.abs(table), np.array([_reach(name) for name in columns])
+    odd = np.isfinite(size) & (size > reach) | (size > 0) & (size < SMALLEST_VALUE)
+    intensity = table[:, [name.lower() in INTENSITY_NAMES for name in columns]]
+    negative = (intensity < 0) & (intensity != SENTINEL)
+    return float((odd.any(axis=1) | negative.any(axis=1)).mean())
 
 
 def _reach(name: str) -> float:

@@ -21,25 +21,14 @@ _MEMBER = b"PK\x01\x02"
 
 
 @dataclass(frozen=True)
-class NpyHeader:
-    """The layout of the columns of a .npy file.
-
-    Attributes:
-        structured: True if they are named fields, and not side by side without names.
-    """
-
-    structured: bool
-
-
-@dataclass(frozen=True)
-class NpzHeader:
-    """The layout of the columns of an .npz file.
+class NumpyHeader:
+    """The layout of the columns of a .npy or .npz file.
 
     Attributes:
         constants: Arrays that are not one value per point, e.g. the angles of the beams.
-        table: Name of the array that holds several columns, if there is one.
+        table: Name of the array of an .npz that holds several columns, if there is one.
         columns: Their names.
-        structured: True if they are named fields of that array.
+        structured: True if they are named fields of that array, or of that of a .npy.
     """
 
     constants: Columns
@@ -70,7 +59,8 @@ class Npy(Format):
         array = _array(content.data)
         shape = _organised(content.path, _grid_of_table(array))
         fields = _columns_of_table(content.path, array, columns)
-        return scan_of(content.path, fields, shape, NpyHeader(bool(array.dtype.names)))
+        header = NumpyHeader({}, structured=bool(array.dtype.names))
+        return scan_of(content.path, fields, shape, header)
 
     def encode(self, path: Path, scan: Scan) -> bytes:
         """A scan's columns as one array.
@@ -78,9 +68,9 @@ class Npy(Format):
         Columns of one dtype become an array (N, C), unless the scan comes from a structured one;
         columns of several become a structured array. Organised clouds stay organised.
         """
-        if isinstance(scan.header, NpyHeader) and scan.header.structured:
-            return _to_bytes(_gridded(scan, _table(scan.fields, structured=True)))
-        return _to_bytes(_gridded(scan, _table(columns_of(scan), structured=False)))
+        structured = isinstance(scan.header, NumpyHeader) and scan.header.structured
+        columns = scan.fields if structured else columns_of(scan)
+        return _to_bytes(_gridded(scan, _table(columns, structured)))
 
 
 @FORMATS.add(".npz")
@@ -126,12 +116,12 @@ class Npz(Format):
             else:
                 constants[name] = array
         _refuse_other_points(path, grid, fields, constants)
-        header = NpzHeader(constants, table, stated, structured)
+        header = NumpyHeader(constants, table, stated, structured)
         return scan_of(path, fields, shape, header)
 
     def encode(self, path: Path, scan: Scan) -> bytes:
         """A scan's columns as named arrays, compressed. Organised clouds stay organised."""
-        header = scan.header if isinstance(scan.header, NpzHeader) else NpzHeader({})
+        header = scan.header if isinstance(scan.header, NumpyHeader) else NumpyHeader({})
         columns = dict(scan.fields or columns_of(scan))
         arrays: dict[str, Array] = {}
         if header.table is not None and columns.keys() >= set(header.columns):
