@@ -24,6 +24,10 @@ __all__ = ["DEFAULT_COLUMNS", "count_points", "find_scans", "read_scan", "write_
 # the scans were taken, KITTI's poses, times and calibration, and what a person is to read.
 RECORDS = (METADATA, "calib.txt", "poses.txt", "times.txt", "timestamps.txt", "README.txt")
 
+# Suffixes of tables that are likely to be records of something else, such as of poses, the likelier
+# the higher, with 0 for all other suffixes: of a folder's files, those of the lowest are its scans.
+LIKELY_RECORDS = {".csv": 1, ".txt": 2}
+
 
 def read_scan(path: Path | str, columns: Sequence[str] = DEFAULT_COLUMNS) -> Scan:
     """Reads one scan.
@@ -127,8 +131,9 @@ def _scans_in(folder: Path) -> list[Path]:
         and not path.name.startswith(".")
         and path.is_file()
     )
-    least = min((FORMATS[scan_suffix(path)].RECORD for path in scans), default=0)
-    scans = [path for path in scans if least == FORMATS[scan_suffix(path)].RECORD]
+    likely = {path: LIKELY_RECORDS.get(scan_suffix(path), 0) for path in scans}
+    least = min(likely.values(), default=0)
+    scans = [path for path in scans if likely[path] == least]
     if not scans:
         reason = f"holds no scans ({', '.join(FORMATS)})"
         raise InputError(folder, reason, "Name a folder with scans in it.")

@@ -31,15 +31,12 @@ class Format(ABC):
         DAMAGE: Exceptions of :meth:`decode`, besides InputError, on content that it cannot read.
         EXTRA: Extra that must be installed for it, if any.
         NAMES_COLUMNS: True if its files name their columns, so that a further one is understood.
-        RECORD: Likelihood that such a file is a record of something else, such as of poses:
-            of a folder's files those of the lowest number are its scans.
     """
 
     HELP: ClassVar[str] = ""
     DAMAGE: ClassVar[tuple[type[Exception], ...]] = (ValueError,)
     EXTRA: ClassVar[Extra | None] = None
     NAMES_COLUMNS: ClassVar[bool] = True
-    RECORD: ClassVar[int] = 0
 
     @abstractmethod
     def decode(self, content: Content, columns: Sequence[str]) -> Scan:

@@ -73,7 +73,7 @@ class TableHeader:
         return b"".join(lines[row] + newline for row in rows)
 
 
-@FORMATS.add(".asc", ".xyz")
+@FORMATS.add(".csv", ".txt", ".asc", ".xyz")
 class Table(Format):
     """Lines of numbers, perhaps under a line of names."""
 
@@ -133,20 +133,6 @@ class Table(Format):
             writer.writerow(columns)
         writer.writerows(zip(*values, strict=True))
         return encode(text.getvalue())
-
-
-@FORMATS.add(".csv")
-class CommaSeparated(Table):
-    """A table that beside scans of other formats is likely to be a record of something else."""
-
-    RECORD = 1
-
-
-@FORMATS.add(".txt")
-class Text(Table):
-    """A table that is even likelier to be something else, such as notes or a list of poses."""
-
-    RECORD = 2
 
 
 def _refuse_unreadable(path: Path, name: str, column: Array, separator: str | None) -> None:
