@@ -88,7 +88,7 @@ def main() -> None:
 
 def _by_both(derainer: Derainer, scan: Scan, rain: Bools) -> ByBoth:
     """Weather of a scan by its labels and by the model."""
-    return ScanWeather.of(scan, rain), derainer.weather(scan)
+    return ScanWeather.of(scan, rain), derainer.judge(scan).weather
 
 
 def _seen(pairs: Iterable[Iterable[ScanWeather]]) -> list[tuple[Visibility, Visibility]]:
@@ -145,7 +145,9 @@ def _real(data: Path, derainer: Derainer) -> str:
         scan = read_scan(path)
         rain = _labelled(path, scan)
         by_labels = None if rain is None else ScanWeather.of(scan, rain)
-        rows.append(_row(f"{path.parent.name}/{path.name}", by_labels, derainer.weather(scan)))
+        rows.append(
+            _row(f"{path.parent.name}/{path.name}", by_labels, derainer.judge(scan).weather)
+        )
     title = "real scans (snow in the first, simulated snow in 00000*, none in the others)"
     return f"{title}\n{plain_table(rows)}"
 

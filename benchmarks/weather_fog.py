@@ -66,7 +66,7 @@ def _clean(paths: Sequence[Path], derainer: Derainer) -> str:
     rows[0] += ["beside the dry scan"]
     for path in paths:
         scan = read_scan(path)
-        dry, fog = derainer.weather(scan), derainer.weather(in_fog(scan, *FOG))
+        dry, fog = (derainer.judge(each).weather for each in (scan, in_fog(scan, *FOG)))
         seen = (fog.visibility, fog.reach)
         levels = [alarm.level_of(*seen) for alarm in (Alarm(), Alarm(dry=dry.reach))]
         figures = (dry.visibility, dry.reach, fog.range_of(0.95), fog.reach, fog.visibility)

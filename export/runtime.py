@@ -27,7 +27,6 @@ from derain.system.stopwatch import Stopwatch
 from derain.views.probability import probability_of_rain
 from derain.views.scan_issues import ScanIssue, intensity_in_places, outside_view
 from derain.views.view import View, ViewedScan
-from derain.weather.scan_weather import ScanWeather
 
 __all__ = ["METADATA_KEY", "Derainer", "Judgement"]
 
@@ -142,25 +141,6 @@ class Derainer(ScanMethod):
         probability = np.where(dark, of_blank.probability, judgement.probability)
         rain = np.where(dark, of_blank.rain, judgement.rain)
         return Judgement(probability, rain, judgement.judged | dark, scan)
-
-    def weather(self, points: Scan | Array) -> ScanWeather:
-        """Returns the weather that a scan shows: shares of rain, and visibility.
-
-        What was judged already has it as :attr:`Judgement.weather`.
-
-        Example:
-            >>> points = np.fromfile("scan.bin", np.float32).reshape(-1, 4)
-            >>> weather = Derainer().weather(points)
-            >>> weather.rays, str(weather.visibility)
-            (820, '42.9 m [29.5 to 64.7 m]')
-
-        Args:
-            points: As for calling the model.
-
-        Raises:
-            InputError: A network that fails, or whose scores are not finite.
-        """
-        return self.judge(points).weather
 
     def fingerprint(self) -> str:
         """A fingerprint of its file as it was read, its threshold and its runtime."""

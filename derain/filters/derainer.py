@@ -15,7 +15,6 @@ from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
 from derain.views.one_viewpoint import viewpoint_issues
 from derain.views.scan_issues import ScanIssue, intensity_in_places
-from derain.weather.scan_weather import ScanWeather
 
 # What bounds are called among the parameters of a filter; they are the same for every one.
 CANDIDATES = "candidates"
@@ -76,16 +75,6 @@ class FilterDerainer(ScanMethod):
         with stopwatch.stage("back"):
             rain, judged = rows_of(of_points, point), point >= 0
         return self.with_warnings(Judgement(rain.astype(np.float32), rain, judged, scan))
-
-    def weather(self, points: Scan | Array) -> ScanWeather:
-        """Returns the weather that a scan shows.
-
-        What was judged already has it as :attr:`Judgement.weather`.
-
-        Args:
-            points: As for calling the filter.
-        """
-        return self.judge(points).weather
 
     @property
     def gives_probabilities(self) -> bool:
