@@ -15,8 +15,6 @@ from benchmarks.fuzzing.reader import Reader
 from derain.annotation.manifest import LABELS, TAUGHT_PARTS, Manifest
 from derain.annotation.scene import read_scene
 from derain.cards.card import load_card, packaged_cards
-from derain.cards.layout import Layout
-from derain.evaluation.contents import find_sequences
 from derain.evaluation.hard_cases import scene
 from derain.export.methods import read_parameters
 from derain.files.documents import Entry
@@ -94,7 +92,6 @@ tilt: [0, 3]
 defects: {none: 0.2, dropped: [0.0, 0.3], merging: [0.5, 2.0]}
 """
 TIMES = "frame,timestamp,other\n000000,1.5,a\n000001.bin,1.6,b\n000002,1.7,\n"
-WEATHER = "time,rain_rate_mm_h,wind\n0,25.0,1\n1,nan,1\n2,10,2\n"
 
 
 def readers() -> list[Reader]:
@@ -127,7 +124,6 @@ def readers() -> list[Reader]:
             lambda generator: as_json(changed(manifest, generator)),
         ),
         Reader("times", "metadata.csv", _read_times, lambda: [TIMES.encode()]),
-        Reader("weather", "weather.csv", _read_weather, lambda: [WEATHER.encode()]),
     ]
 
 
@@ -244,13 +240,3 @@ def _read_taught(path: Path) -> None:
 def _read_times(path: Path) -> None:
     names = ("000000.bin", "000001.bin", "000002.bin")
     assert np.isfinite(read_frame_times([path.with_name(name) for name in names])).all()
-
-
-def _read_weather(path: Path) -> None:
-    sequence = path.parent / "sequences" / "000"
-    for folder in ("velodyne", "weather"):
-        (sequence / folder).mkdir(parents=True, exist_ok=True)
-    (sequence / "velodyne" / "0.bin").write_bytes(b"")
-    (sequence / "weather" / "0.csv").write_bytes(path.read_bytes())
-    ((_, rate),) = find_sequences(path.parent, Layout())
-    assert rate is None or math.isfinite(rate)

@@ -1,21 +1,17 @@
 """Counts of a data set: scans and points by class and by rain rate."""
 
-import csv
-import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from statistics import median
 from typing import Any, Self
 
 import numpy as np
 
-from derain.cards.layout import Layout, folder_above
+from derain.cards.layout import Layout
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS
 from derain.files.names import scan_stem
-from derain.files.reading import reading
 from derain.jobs.running import ValueWork
 from derain.simulation.manifest import RAIN_RATE, manifest_of
 from derain.sources.folders import frames_of, named_frames
@@ -103,7 +99,7 @@ def find_sequences(
         mm/h, None where it is not known.
 
     Raises:
-        InputError: A folder without sequences or scans, or a damaged weather record.
+        InputError: A folder without sequences or scans.
     """
     if layout is None:
         recordings = recordings_of(named_frames(root, columns, labelled=True, layouts=layouts))
@@ -122,8 +118,7 @@ def find_sequences(
         scans = listed_scans([folder])
         keys = [f"{name}/{scan_stem(scan)}" for scan in scans]
         frames = frames_of(scans, layout.label_of, columns, keys)
-        rate = rates[name] if name in rates else _recorded_rate(folder_above(folder) / "weather")
-        sequences.append((frames, rate))
+        sequences.append((frames, rates.get(name)))
     return sequences
 
 
@@ -144,13 +139,3 @@ class FrameCounting(ValueWork[FrameUnit]):
                 counts = np.bincount(frame.read_label(of_frame))
                 labelled.update({str(id_): int(counts[id_]) for id_ in np.flatnonzero(counts)})
         return {"scans": len(unit.frames), "points": points, "labelled": dict(labelled)}
-
-
-def _recorded_rate(weather: Path) -> float | None:
-    """Median rain rate of the weather records of a sequence, mm/h, if they state any."""
-    rates = []
-    for record in sorted(weather.glob("*.csv")):
-        with reading(record, ValueError, csv.Error), record.open(newline="") as lines:
-            rates += [float(row[RAIN_RATE]) for row in csv.DictReader(lines) if row.get(RAIN_RATE)]
-    measured = [rate for rate in rates if math.isfinite(rate)]  # a gauge that fails writes nan
-    return median(measured) if measured else None

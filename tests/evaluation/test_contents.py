@@ -31,11 +31,6 @@ def add_scan(sequence: Path, layout: Layout, stem: str, label: list[int]) -> Non
     write_labels(sequence / layout.labels / f"{stem}.label", np.array(label))
 
 
-def record(sequence: Path, text: str, stem: str = "000000") -> None:
-    (sequence / "weather").mkdir(parents=True, exist_ok=True)
-    (sequence / "weather" / f"{stem}.csv").write_text(text)
-
-
 def test_a_folder_of_scans_is_one_sequence_and_other_folders_have_to_be_named(tmp_path) -> None:
     write_scan(tmp_path / "scan.ply", Scan.of(scene(30)))
     ((frames, _),) = find_sequences(tmp_path, None)
@@ -48,25 +43,12 @@ def test_a_folder_of_scans_is_one_sequence_and_other_folders_have_to_be_named(tm
         find_sequences(tmp_path, Layout())
 
 
-def test_the_manifest_states_rain_rates_before_the_weather_does(tmp_path) -> None:
-    for name in ("001", "000", "002", ".003"):  # the last is not finished, and not counted
+def test_the_manifest_states_rain_rates(tmp_path) -> None:
+    for name in ("001", "000", ".003"):  # the last is not finished, and not counted
         add_scan(tmp_path / "sequences" / name, REHEARSE3D, "000000", [0])
-        record(tmp_path / "sequences" / name, "rain_rate_mm_h,wind\n9.0,1\n")
-    record(tmp_path / "sequences/001", "rain_rate_mm_h,wind\n11.0,1\n12.0,1\n", "000001")
-    record(tmp_path / "sequences/002", "temperature\n9\n")
     manifest = {"made_by": MAKER, "rain_rate_mm_h": {"000": 10.0}}
     (tmp_path / "manifest.json").write_text(json.dumps(manifest))
-    assert [rate for _, rate in find_sequences(tmp_path, REHEARSE3D)] == [10, 11, None]
-
-
-def test_a_rain_gauge_that_fails_is_not_heeded_and_a_damaged_record_is_named(tmp_path) -> None:
-    for name, rates in {"000": "nan\n9\ninf", "001": "nan"}.items():
-        add_scan(tmp_path / name, REHEARSE3D, "000000", [0])
-        record(tmp_path / name, f"rain_rate_mm_h\n{rates}\n")
-    assert [rate for _, rate in find_sequences(tmp_path, REHEARSE3D)] == [9, None]
-    record(tmp_path / "000", "rain_rate_mm_h\nwet\n")
-    with pytest.raises(InputError, match=r"000000\.csv: cannot be read"):
-        find_sequences(tmp_path, REHEARSE3D)
+    assert [rate for _, rate in find_sequences(tmp_path, REHEARSE3D)] == [10, None]
 
 
 def counted(frames: Sequence[Frame]) -> Contents:
