@@ -5,7 +5,7 @@ Nothing here loads torch.
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -22,26 +22,21 @@ from derain.sources.search import find_layout
 from derain.sources.source import Source
 
 
+@dataclass
 class LabelledScans(ScanData):
     """Labelled scans that a user names.
 
-    Args:
+    Attributes:
         card: Data card of the scans.
         loading: Options for reading scans.
         source_of: Returns the scans of a part.
         has_parts: True if the parts differ; where not, every part is all scans.
     """
 
-    def __init__(
-        self,
-        card: DataCard,
-        loading: Loading,
-        source_of: Callable[[Part], Source],
-        has_parts: bool = True,
-    ) -> None:
-        super().__init__(card, loading)
-        self.has_parts = has_parts
-        self._source_of = source_of
+    card: DataCard
+    loading: Loading
+    source_of: Callable[[Part], Source]
+    has_parts: bool = True
 
     def source(self, part: Part) -> Source:
         """The scans of a part, in order, and where their labels should be.
@@ -49,7 +44,7 @@ class LabelledScans(ScanData):
         Raises:
             InputError: Missing folders or scans.
         """
-        return self._source_of(part)
+        return self.source_of(part)
 
 
 def labelled_scans(
