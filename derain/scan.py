@@ -109,18 +109,12 @@ class Scan:
             own = {title: _read_only(column) for title, column in self.fields.items()}
             object.__setattr__(self, "fields", own)
         columns = [("intensity", self.intensity), ("label", self.label), ("radar", self.radar)]
-        for title, column in columns:
-            if column is not None and column.ndim != 1:
-                raise InputError(
-                    self.name, f"{title} has shape {column.shape}", "Give one value per point."
-                )
-        for title, column in [*columns, *self.fields.items()]:
-            if column is not None and len(column) != len(self.xyz):
-                raise InputError(
-                    self.name,
-                    f"{title} has {len(column)} rows for {len(self.xyz)} points",
-                    "Give one value per point.",
-                )
+        shapes = [(title, column.shape) for title, column in columns if column is not None]
+        shapes += [(title, column.shape[:1]) for title, column in self.fields.items()]
+        for title, shape in shapes:
+            if shape != (len(self.xyz),):
+                reason = f"{title} has shape {shape} for {len(self.xyz)} points"
+                raise InputError(self.name, reason, "Give one value per point.")
 
     def _copied(self, title: str, convert: Callable[[Any], Array]) -> Array:
         """A copy of a column that was given, in the dtype that it has in a scan."""

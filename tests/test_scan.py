@@ -184,7 +184,7 @@ def test_a_column_of_another_shape_is_refused(column) -> None:
     short = np.zeros(2)
     columns = {column: {"ring": short} if column == "fields" else short}
     title = "ring" if column == "fields" else column
-    with pytest.raises(InputError, match=f"cloud.bin: {title} has 2 rows for 3 points"):
+    with pytest.raises(InputError, match=f"cloud.bin: {title} has shape .2,. for 3 points"):
         Scan(np.zeros((3, 3), np.float32), name="cloud.bin", **columns)
     if column != "fields":
         with pytest.raises(InputError, match=rf"{column} has shape \(3, 1\)"):

@@ -7,7 +7,6 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from derain.errors import InputError
 from derain.filters.airborne import Around, fit_rain_bounds
 from derain.filters.ground import find_ground
 from derain.filters.point_filter import FILTERS, PointFilter, RainAndPoints, filter_view
@@ -29,10 +28,6 @@ BESIDE_RANGE = 0.1
 # Of points of any intensity up to 2 the feature is at least 5 / 3, and at most 4 / 3 · (5 + 1)
 # where neighbours are no farther, on average, than the sensor. Fitted, it is scaled by these.
 LEAST_FEATURE, LARGEST_FEATURE = 5 / 3, 8.0
-
-
-# Fewer points are always in a plane, and nothing would ever be seen to be in the air.
-FEWEST_NEIGHBOURS = 4
 
 
 @FILTERS.add("crf")
@@ -73,8 +68,7 @@ class CRF(PointFilter):
         (20, True)
 
     Attributes:
-        neighbours: Size of a neighbourhood, the point itself included; of variant ``fitted`` at
-            least 4.
+        neighbours: Size of a neighbourhood, the point itself included, at least 4.
         variant: ``fitted`` or ``published``.
         vote: Weight of a neighbour that is judged, beside features from -1 to 1.
         sparseness: Of variant ``fitted``: how many times as far as usual, for its range, the
@@ -87,8 +81,7 @@ class CRF(PointFilter):
         FULL_SCALE: Of the intensities that variant ``published`` is for.
 
     Raises:
-        InputError: Another variant, fewer neighbours than it needs, and as of
-            :class:`derain.filters.PointFilter`.
+        InputError: Another variant, and as of :class:`derain.filters.PointFilter`.
 
     Source: W. Wang et al., "Snow Removal for LiDAR Point Clouds With Spatio-Temporal Conditional
         Random Fields", RA-L 2023, and its constants at github.com/dut-mdmu/CRFOR. The order
@@ -97,12 +90,14 @@ class CRF(PointFilter):
 
     HELP = "rain is near, above the ground, as bright as drops are, and beside rain"
     SPACE: ClassVar = {
-        "neighbours": (FEWEST_NEIGHBOURS, 12),
+        "neighbours": (4, 12),
         "vote": (0.1, 20.0),
         "sparseness": (1.5, 10.0),
         "reach": (0.5, 5.0),
     }
     FULL_SCALE = 255.0
+    # Fewer points are always in a plane, and nothing would ever be seen to be in the air.
+    FEWEST_NEIGHBOURS = 4
 
     neighbours: int = 8
     variant: Literal["fitted", "published"] = "fitted"
@@ -112,12 +107,6 @@ class CRF(PointFilter):
     intensity: float = 2.0
     range: float = 30.0
     sensor_height: float = 1.8
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.variant == "fitted" and self.neighbours < FEWEST_NEIGHBOURS:
-            reason = f"neighbours is {self.neighbours}, and so few points always lie in a plane"
-            raise InputError(self.name, reason, f"Give {FEWEST_NEIGHBOURS} or more.")
 
     def judge(self, view: Neighbourhoods) -> Bools:
         """Returns which points are rain; see :class:`PointFilter`."""

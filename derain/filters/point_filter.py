@@ -66,16 +66,19 @@ class PointFilter(ABC):
         SPACE: Where each parameter is looked for by ``derain tune``; those not named stay as they
             are by default. Whole numbers are drawn evenly, all else evenly in its logarithm: what
             fits one sensor may be a tenth of what fits another. A filter without any is not tuned.
+        FEWEST_NEIGHBOURS: The fewest that it can look at.
         neighbours: k, the points of a neighbourhood that the filter looks at, the point itself
             included.
 
     Raises:
-        InputError: ``neighbours`` that is not a whole number from 2 to 200, another number that is
-            negative, not finite or above 1e100, or none of the names that a ``Literal`` lists.
+        InputError: ``neighbours`` that is not a whole number from the fewest to 200, another number
+            that is negative, not finite or above 1e100, or none of the names that a ``Literal``
+            lists.
     """
 
     HELP: ClassVar[str] = ""
     SPACE: ClassVar[Mapping[str, Span]] = MappingProxyType({})
+    FEWEST_NEIGHBOURS: ClassVar[int] = 2  # the point itself and one more
 
     neighbours: int
 
@@ -85,7 +88,7 @@ class PointFilter(ABC):
             if isinstance(value, np.generic):  # records and fingerprints hold primitives
                 value = value.item()
                 object.__setattr__(self, parameter.name, value)
-            if remedy := _remedy(parameter, value):
+            if remedy := _remedy(parameter, value, self.FEWEST_NEIGHBOURS):
                 raise InputError(self.name, f"{parameter.name} is {shown(value)}", remedy)
 
     @property
@@ -204,16 +207,13 @@ def rows_of(points: Bools, inverse: Ints) -> Bools:
     return np.append(points, False).take(inverse)
 
 
-def _remedy(parameter: Field[Any], value: Any) -> str | None:
+def _remedy(parameter: Field[Any], value: Any, fewest: int) -> str | None:
     """The remedy for an impossible value of a parameter; None if the value is possible."""
     is_number = isinstance(value, Real) and not isinstance(value, bool)
     if parameter.name == "neighbours":
         is_whole = is_number and isinstance(value, Integral)
-        if not (is_whole and 2 <= value <= MOST_FILTER_NEIGHBOURS):
-            return (
-                "Give a whole number from 2 (the point itself and one more) to "
-                f"{MOST_FILTER_NEIGHBOURS}."
-            )
+        if not (is_whole and fewest <= value <= MOST_FILTER_NEIGHBOURS):
+            return f"Give a whole number from {fewest} to {MOST_FILTER_NEIGHBOURS}."
     elif parameter.type in (float, "float"):  # the text, where annotations are put off
         if not (is_number and 0 <= value <= LARGEST_NUMBER):
             return f"Give a finite number that is not negative, {LARGEST_NUMBER:g} at most."

@@ -135,7 +135,7 @@ def test_a_filter_is_called_what_it_is_registered_by_and_its_numbers_are_checked
         (
             "crf",
             {"neighbours": 3},
-            "crf: neighbours is 3, and so few points always lie in a plane. Give 4 or more.",
+            "crf: neighbours is 3. Give a whole number from 4 to 200.",
         ),
     ],
 )
