@@ -211,12 +211,8 @@ def _parts(scans: int) -> list[TaughtPart]:
 
 
 def _relative_path(home: Path, scan: Path) -> str:
-    """The path of a scan relative to a folder; absolute where there is no relative one."""
-    place = Path(os.path.realpath(scan.parent)) / scan.name
-    try:
-        return Path(os.path.relpath(place, home)).as_posix()
-    except ValueError:  # another drive of Windows
-        return str(place)
+    """The path of a scan relative to a folder."""
+    return os.path.relpath(Path(os.path.realpath(scan.parent)) / scan.name, home)
 
 
 def _scan_of(entry: Entry, home: Path) -> TaughtScan:
