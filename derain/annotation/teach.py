@@ -358,7 +358,7 @@ def refuse_to_overwrite(out: Path, source: Source) -> None:
             reason = "its path is not UTF-8, and the manifest could not hold it"
             raise InputError(frame.name, reason, "Rename its file or folder.") from error
     # Refuses the places where the scans' own labels are or would be searched for.
-    for sink in (FolderSink(out / LABELS, again=False), LabelSink(out / LABELS, again=False)):
+    for sink in (FolderSink(out / LABELS), LabelSink(out / LABELS)):
         sink.refuse_clashes(source)
     if is_taught(out):
         return

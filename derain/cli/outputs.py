@@ -26,7 +26,7 @@ def folder_sink(out: Path, source: Source) -> FolderSink:
         InputError: It holds a scan or labels that would be overwritten, two scans have one name, or
             it cannot be written.
     """
-    sink = FolderSink(out, again=False)
+    sink = FolderSink(out)
     sink.refuse_clashes(source)
     require_writable_folder(out)
     return sink

@@ -74,7 +74,7 @@ class CleanSink:
         self.probability = probability
         self.options = {"removed": removed is not None, "probability": probability, **asdict(bags)}
         self._source = source
-        self._files = FolderSink(self.folder, again=False)
+        self._files = FolderSink(self.folder)
         self._removed = None if removed is None else FolderSink(_path_of(removed), "--removed")
         stored = (frame for frame in source if isinstance(frame, StoredBag))
         self._stored_bags: dict[Frame, Path] = {}

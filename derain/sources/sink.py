@@ -22,13 +22,11 @@ class FolderSink:
     Args:
         folder: The folder, made if missing.
         option: The user's name for it, for messages.
-        again: True if a source may give a scan twice, as where two patterns find it.
     """
 
-    def __init__(self, folder: Path, option: str = "--out", again: bool = True) -> None:
+    def __init__(self, folder: Path, option: str = "--out") -> None:
         self.folder = folder
         self.option = option
-        self.again = again
 
     def scan_path(self, frame: Frame) -> Path:
         """The file that a scan is written to; one that came from no file is written as a PCD."""
@@ -52,7 +50,7 @@ class FolderSink:
                 self._refuse_own_files(frame)
             target = self.path(frame, LABEL)
             other = written.setdefault(_real(target), frame)
-            if other is not frame and not (self.again and _is_one_file(other, frame)):
+            if other is not frame:
                 raise InputError(
                     frame.name,
                     f"another scan has the same name: its results and those of {other.name} would "
@@ -131,11 +129,6 @@ def _real(path: Path) -> str:
 def _real_folder(folder: str) -> str:
     """The path of a folder without symbolic links; a hundred thousand scans may lie in one."""
     return os.path.realpath(folder)
-
-
-def _is_one_file(one: Frame, other: Frame) -> bool:
-    """True if two frames are of the same file, and thus have the same results."""
-    return isinstance(one, FileFrame) and isinstance(other, FileFrame) and one.name == other.name
 
 
 def _labels_of(frames: Iterable[Frame]) -> Iterator[Path]:

@@ -41,7 +41,9 @@ class PredictionWriter(BasePredictionWriter):
         self.written = 0
         dataset = getattr(trainer.predict_dataloaders, "dataset", None)
         if isinstance(dataset, ReadableScans):
-            self.sink.refuse_clashes(dataset.frames)
+            # Two patterns may find one scan.
+            frames = {(frame.name, frame.key): frame for frame in dataset.frames}
+            self.sink.refuse_clashes(frames.values())
         # What one process writes must not be there while another looks for labels.
         trainer.strategy.barrier()
 

@@ -99,12 +99,11 @@ def test_two_scans_of_one_key_are_refused(tmp_path) -> None:
             FolderSink(tmp_path / "out").refuse_clashes(scans)
 
 
-def test_one_scan_twice_is_refused_where_it_is_not_expected(tmp_path) -> None:
+def test_one_scan_twice_is_refused(tmp_path) -> None:
     write(tmp_path / "0.bin")
     twice = [frame_of(tmp_path / "0.bin"), frame_of(tmp_path / "0.bin")]
-    FolderSink(tmp_path / "out").refuse_clashes(twice)
     with pytest.raises(InputError, match="another scan has the same name"):
-        FolderSink(tmp_path / "out", again=False).refuse_clashes(twice)
+        FolderSink(tmp_path / "out").refuse_clashes(twice)
 
 
 def test_scans_labels_and_what_is_taken_away_are_named_by_the_key(tmp_path) -> None:
