@@ -37,7 +37,7 @@ from derain.sources.judgement import Judgement
 from derain.sources.judging import Guard, unguarded
 from derain.sources.method import Method
 from derain.sources.recordings import irregularities
-from derain.sources.sink import FolderSink, LabelSink
+from derain.sources.sink import FolderSink
 from derain.sources.source import Source
 from derain.sources.unit_judging import UnitJudging
 from derain.sources.units import Division, FrameUnit, units_of, whole
@@ -358,8 +358,7 @@ def refuse_to_overwrite(out: Path, source: Source) -> None:
             reason = "its path is not UTF-8, and the manifest could not hold it"
             raise InputError(frame.name, reason, "Rename its file or folder.") from error
     # Refuses the places where the scans' own labels are or would be searched for.
-    for sink in (FolderSink(out / LABELS), LabelSink(out / LABELS)):
-        sink.refuse_clashes(source)
+    FolderSink(out / LABELS).refuse_clashes(source)
     if is_taught(out):
         return
     for name in (TAUGHT_MANIFEST, CARD, LABELS):

@@ -1,14 +1,14 @@
 """Folders for the results of frames; each file is named by the key of its frame."""
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 
 from derain.cards.known import label_places
 from derain.errors import InputError
 from derain.files import write_scan
-from derain.files.labels import LABEL, label_beside, write_labels
+from derain.files.labels import LABEL, write_labels
 from derain.files.names import beside
 from derain.scan import Array, Scan
 from derain.sources.file_frame import FileFrame
@@ -90,34 +90,6 @@ class FolderSink:
         return InputError(url_of(self.folder), reason, f"Give {self.option} another folder.")
 
 
-class LabelSink(FolderSink):
-    """A folder of labels alone, ``<key>.label``.
-
-    They may lie with the scans, and where the labels of scans are looked for: they may be meant for
-    these. Labels that are there already stay.
-
-    Args:
-        folder: The folder, made if missing.
-        option: The user's name for it, for messages.
-    """
-
-    def refuse_clashes(self, source: Iterable[Frame]) -> None:
-        """Refuses to overwrite existing labels, or one result by another."""
-        frames = list(source)
-        # Not Path.is_file, which raises where the name has become too long by its suffix.
-        there = {os.path.realpath(label) for label in _labels_of(frames) if os.path.isfile(label)}
-        for frame in frames:
-            target = self.path(frame, LABEL)
-            if os.path.realpath(target) in there:
-                raise self._refused(
-                    f"the results of {frame.name} would overwrite the labels {target}"
-                )
-        super().refuse_clashes(frames)
-
-    def _refuse_own_files(self, frame: FileFrame) -> None:
-        """Checks existing labels alone, because no scan is written."""
-
-
 def _real(path: Path) -> str:
     """The path of a file or folder without symbolic links."""
     folder, name = os.path.split(path)
@@ -129,11 +101,3 @@ def _real(path: Path) -> str:
 def _real_folder(folder: str) -> str:
     """The path of a folder without symbolic links; a hundred thousand scans may lie in one."""
     return os.path.realpath(folder)
-
-
-def _labels_of(frames: Iterable[Frame]) -> Iterator[Path]:
-    """Paths at which the labels of files are looked for."""
-    for frame in frames:
-        if isinstance(frame, FileFrame):
-            places = (frame.label_path, label_beside(frame.path), beside(frame.path, LABEL))
-            yield from filter(None, places)

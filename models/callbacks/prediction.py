@@ -14,7 +14,7 @@ from derain.learning.task import ReadableScans
 from derain.models.base import DerainingModule
 from derain.scan import Float32s
 from derain.sources.frame import MemoryFrame
-from derain.sources.sink import LabelSink
+from derain.sources.sink import FolderSink
 
 
 class PredictionWriter(BasePredictionWriter):
@@ -26,15 +26,15 @@ class PredictionWriter(BasePredictionWriter):
 
     def __init__(self, folder: str = "predictions") -> None:
         super().__init__(write_interval="batch")
-        self.sink = LabelSink(Path(folder), "--predictions.folder")
+        self.sink = FolderSink(Path(folder), "--predictions.folder")
         self.written = 0
 
     def on_predict_start(self, trainer: lightning.Trainer, model: DerainingModule) -> None:
         """Looks at where the labels of all scans will be, before the first of them is judged.
 
         Raises:
-            InputError: What is to be written would take the place of labels that are there, or
-                of what is written for another scan.
+            InputError: What is to be written would lie where a scan or its labels are looked for,
+                or take the place of what is written for another scan.
         """
         # What is written need not be kept: probabilities of a data set fill gigabytes.
         trainer.predict_loop.return_predictions = False
@@ -44,8 +44,6 @@ class PredictionWriter(BasePredictionWriter):
             # Two patterns may find one scan.
             frames = {(frame.name, frame.key): frame for frame in dataset.frames}
             self.sink.refuse_clashes(frames.values())
-        # What one process writes must not be there while another looks for labels.
-        trainer.strategy.barrier()
 
     def write_on_batch_end(
         self,

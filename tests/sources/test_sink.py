@@ -14,7 +14,7 @@ from derain.sources.clean_sink import CleanSink
 from derain.sources.folders import frame_of, frames_of, named_frames, relative_keys
 from derain.sources.frame import MemoryFrame
 from derain.sources.judgement import Judgement
-from derain.sources.sink import FolderSink, LabelSink
+from derain.sources.sink import FolderSink
 from derain.sources.source import Frames, Source
 
 
@@ -129,23 +129,3 @@ def test_what_is_taken_away_is_refused_where_it_would_take_a_place(tmp_path) -> 
         CleanSink(out, source, removed=tmp_path / "scans")
     with pytest.raises(InputError, match="where the cleaned scans go"):
         CleanSink(out, source, removed=tmp_path / "scans/../out")
-
-
-@pytest.mark.parametrize("own", ["a/0.label", "labels/0.label", "truth/0.label"])
-def test_labels_that_are_there_stay(tmp_path, own) -> None:
-    frames = labelled(tmp_path, "a/0.bin", labels="truth")
-    label = tmp_path / own
-    label.parent.mkdir(parents=True)
-    sink = LabelSink(label.parent, "--labels")
-    sink.refuse_clashes(frames)  # where they would be looked for, and are not
-    label.write_bytes(b"")
-    with pytest.raises(InputError, match=r"overwrite the labels .*0\.label\. Give --labels"):
-        sink.refuse_clashes(frames)
-
-
-def test_what_is_found_for_one_scan_is_not_written_over_the_labels_of_another(tmp_path) -> None:
-    frames = labelled(tmp_path, "0.bin", "out/0.bin")
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out/0.label").touch()
-    with pytest.raises(InputError, match="overwrite the labels"):
-        LabelSink(tmp_path / "out").refuse_clashes(frames)
