@@ -13,6 +13,9 @@ from types import ModuleType
 # further processes that Lightning starts for the run watch.
 LAUNCHER = "DERAIN_LAUNCHER"
 
+# Threads that start processes at once would take each other's stand-in for the main module.
+_starting = threading.Lock()
+
 
 @contextmanager
 def without_main_module() -> Iterator[None]:
@@ -22,12 +25,13 @@ def without_main_module() -> Iterator[None]:
     process needs. Where it does not, that would only take time and memory; and a script that does
     not guard its work by ``if __name__ == "__main__"`` would do all of it again.
     """
-    main = sys.modules["__main__"]
-    sys.modules["__main__"] = ModuleType("__main__")
-    try:
-        yield
-    finally:
-        sys.modules["__main__"] = main
+    with _starting:
+        main = sys.modules["__main__"]
+        sys.modules["__main__"] = ModuleType("__main__")
+        try:
+            yield
+        finally:
+            sys.modules["__main__"] = main
 
 
 def exit_with_launcher() -> None:
