@@ -48,7 +48,7 @@ def test_extra_channels_are_measured_and_batched_for_a_model_that_names_them(dat
     for name in ("radar", "doppler", "rcs"):
         values = np.concatenate([scan.fields[name] for scan in scans])
         expected = (np.nanmean(values), np.nanstd(values))
-        np.testing.assert_allclose(data.card.extra[name], expected, rtol=1e-5)
+        np.testing.assert_allclose(data.card.moments[name], expected, rtol=1e-5)
     assert model.spec.units[4:] == ("dBsm", "0 or 1", "m/s")
     for number, batch in enumerate(data.test_dataloader()):
         (measured,) = batch.measured

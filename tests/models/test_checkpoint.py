@@ -88,7 +88,7 @@ def test_a_checkpoint_of_something_else_is_refused(content, path, change) -> Non
     ("change", "reason"),
     [
         ({"network": "pointnet"}, "a checkpoint of 'pointnet',"),
-        ({"schema": SCHEMA + 1}, "its Spec: schema .*Upgrade derain"),
+        ({"schema": SCHEMA + 1}, "its Spec: schema: .*Upgrade derain"),
         ({"classes": None}, "its Spec: classes"),
         ({"mean": [1.0, 2.0, 3.0, "4"]}, "its Spec: mean"),
         ({"view": {"kind": "neighbours", "neighbours": 7}}, ".*its view is"),

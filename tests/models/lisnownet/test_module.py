@@ -47,7 +47,7 @@ def test_the_spec_holds_how_the_network_is_used() -> None:
     assert (spec.network, spec.threshold) == ("lisnownet", 0.25)
     assert spec.channels == ("range", "z", "intensity")
     assert spec.units == ("m", "m", "0..255")
-    assert spec.means["intensity"] == WADS.mean[3]
+    assert spec.means["intensity"] == WADS.statistics("intensity")[0]
     assert spec.view["grid"] == grid_of("wads", "").as_dict()
     assert SelectionRule(**spec.rule) == PUBLISHED
     assert (spec.data, spec.licence, spec.rain) == ("WADS", WADS.licence, (110,))

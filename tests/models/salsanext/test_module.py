@@ -20,6 +20,7 @@ from derain.views.view import IGNORED
 from .test_network import published
 
 WADS = load_card("wads")
+MOMENTS = [(26.6, 19.7), *(WADS.statistics(name) for name in ("x", "y", "z", "intensity"))]
 
 
 def test_the_spec_holds_how_the_network_is_used() -> None:
@@ -27,8 +28,7 @@ def test_the_spec_holds_how_the_network_is_used() -> None:
     assert (spec.network, spec.threshold) == ("salsanext", 0.25)
     assert spec.channels == ("range", "x", "y", "z", "intensity")
     assert spec.units == ("m", "m", "m", "m", "0..255")
-    assert spec.mean == (26.6, *WADS.mean)
-    assert spec.std == (19.7, *WADS.std)
+    assert [*zip(spec.mean, spec.std, strict=True)] == MOMENTS
     assert spec.view["grid"] == grid_of("wads", "").as_dict()
     assert spec.rule == {}
     assert (spec.data, spec.licence) == ("WADS", WADS.licence)
@@ -45,7 +45,7 @@ def test_published_weights_give_the_logits_of_the_network_on_normalised_images(
     assert model.spec.view["grid"] == grid_of("semantickitti", "").as_dict()
     inputs = Batch.of([sample(image_network(SalsaNext), scene())]).inputs
     image = np.empty((1, 5, 18, 60), np.float32)
-    for channel, (mean, std) in enumerate(zip((26.6, *WADS.mean), (19.7, *WADS.std), strict=True)):
+    for channel, (mean, std) in enumerate(MOMENTS):
         image[0, channel] = (inputs["image"][0, channel].numpy() - mean) / std
     image *= inputs["valid"].numpy()
     expected = network(torch.from_numpy(image)).permute(0, 2, 3, 1).reshape(-1, 2)
