@@ -1,5 +1,6 @@
 """Fixtures shared by all tests."""
 
+import gc
 import os
 from collections.abc import Callable, Iterator
 from copy import deepcopy
@@ -39,6 +40,11 @@ REPOSITORY = Path(__file__).resolve().parent.parent
 # No test asserts a time, of which a busy machine takes any.
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
+
+
+def pytest_collection_finish() -> None:
+    """Keeps what is loaded out of garbage collection, of which every run would go through it."""
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")
