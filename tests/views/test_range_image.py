@@ -52,7 +52,7 @@ def test_every_pixel_shows_the_nearest_of_its_points(grid, points) -> None:
     assert image.winner.tolist() == winner
     for number, row in enumerate(winner):
         content = image.image.reshape(len(RangeView.channels), -1)[:, number]
-        held = np.zeros(5) if row < 0 else [scan.range[row], *points[row]]
+        held = np.zeros(5) if row < 0 else np.nan_to_num([scan.range[row], *points[row]])
         np.testing.assert_array_equal(content, np.float32(held))
     np.testing.assert_array_equal(image.valid.ravel(), np.array(winner) >= 0)
     nearest = [np.inf if row < 0 else scan.range[row] for row in winner]
