@@ -38,10 +38,11 @@ def run(words: list[str], line: str, folder: Path) -> tuple[int, str]:
         arguments += [*QUIETLY, *NOTHING_DRAWN]
     elif arguments[0] == "export":
         arguments += TIMED_ONCE
-    if (folder / "pyproject.toml").exists():
-        install(folder)
+    # Of what a page installs, `run` alone names members; another process finds their entry points.
+    if arguments[0] == "run" and (folder / "pyproject.toml").exists():
+        packages = install(folder)
         command = [sys.executable, "-c", COMMAND, *arguments]
-        return _finished(command, {"PYTHONPATH": f"{folder}"})
+        return _finished(command, {"PYTHONPATH": f"{folder}{os.pathsep}{packages}"})
     out = io.StringIO()
     with redirect_stdout(out), redirect_stderr(out):
         try:
@@ -51,11 +52,12 @@ def run(words: list[str], line: str, folder: Path) -> tuple[int, str]:
     return code, out.getvalue()
 
 
-def install(folder: Path) -> None:
-    """Makes the entry points of a page's own package known, as an installation would."""
+def install(folder: Path) -> Path:
+    """Writes the entry points of a page's own package, as an installation would; returns where."""
     project = tomllib.loads((folder / "pyproject.toml").read_text("utf-8"))["project"]
-    about = folder / f"{project['name']}-{project['version']}.dist-info"
-    about.mkdir(exist_ok=True)
+    packages = folder / "installed"
+    about = packages / f"{project['name']}-{project['version']}.dist-info"
+    about.mkdir(parents=True, exist_ok=True)
     (about / "METADATA").write_text(
         f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n"
     )
@@ -66,6 +68,7 @@ def install(folder: Path) -> None:
         for line in (f"[{group}]", *(f"{name} = {module}" for name, module in members.items()))
     ]
     (about / "entry_points.txt").write_text("\n".join(lines) + "\n")
+    return packages
 
 
 def _finished(command: list[str], environment: dict[str, str]) -> tuple[int, str]:

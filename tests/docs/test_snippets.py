@@ -15,6 +15,7 @@ import yaml
 
 import derain
 from derain.cli import main as command_line
+from derain.models.registry import NETWORKS
 
 from .pages import PAGES, REPOSITORY, Snippet, snippets
 from .prepared import prepare, put_weights, write_drive
@@ -53,8 +54,12 @@ def page_folder(tmp_path, made_once, random_outdet, monkeypatch) -> Iterator[Pat
     monkeypatch.chdir(tmp_path)
     # The page of troubles shows what is printed where this runtime is missing.
     monkeypatch.setitem(sys.modules, "openvino", None)
+    # What a page adds is gone after it.
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(NETWORKS, "_members", dict(NETWORKS))
     with torch.random.fork_rng(devices=[]):
         yield tmp_path
+    sys.modules.pop("toy_network", None)
 
 
 @pytest.mark.usefixtures("one_block", "short_proof", "in_this_process")
