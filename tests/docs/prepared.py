@@ -17,7 +17,11 @@ from derain.scan import class_ids
 if TYPE_CHECKING:
     from derain.models.outdet import OutDet
 
-KEPT = Path(__file__).resolve().parents[1] / "export" / "kept"
+REPOSITORY = Path(__file__).resolve().parents[2]
+KEPT = REPOSITORY / "tests/export/kept"
+
+# The sensor of the drive, of half its columns: scans are judged in half the time.
+SENSOR = REPOSITORY / "derain/simulation/sensors/spinning_16.yaml"
 
 # Ids of rain and of the rest: of the simulation, of WADS, and of a card that a page makes.
 SIMULATED_RAIN, FALLING_SNOW, ROAD = 3, 110, 40
@@ -25,13 +29,16 @@ SIMULATED_RAIN, FALLING_SNOW, ROAD = 3, 110, 40
 # Metres beyond which the fog of the page of troubles returns nothing.
 FOG_ENDS = 18
 
-# Two seconds, 20,000 points a scan.
-DRIVE = "--layout street --speed 6 --sensor spinning_16 --rain 25 --sequences 1 --scans 5"
+# Half a second, 10,000 points a scan.
+DRIVE = "--layout street --speed 6 --rain 25 --sequences 1 --scans 5"
 
 
 def write_drive(folder: Path) -> None:
     """Simulates a short drive through a street in the rain, and records it in a bag as well."""
-    assert main(["simulate", "--out", str(folder), *DRIVE.split(), "--workers", "1"]) == 0
+    sensor = folder.with_suffix(".yaml")
+    sensor.write_text(SENSOR.read_text("utf-8").replace("columns: 1800", "columns: 900"), "utf-8")
+    simulate = ["simulate", "--out", folder, *DRIVE.split(), "--sensor", sensor, "--workers", 1]
+    assert main([str(word) for word in simulate]) == 0
     clouds = [np.fromfile(scan, np.float32).reshape(-1, 4) for scan in _scans(folder)]
     columns = ("x", "y", "z", "intensity")
     tables = [table_of(dict(zip(columns, cloud.T, strict=True))) for cloud in clouds]
@@ -65,8 +72,9 @@ def prepare(folder: Path, simulated: Path) -> None:
         folder / "labelled/000000.label", folder / "my_data/sequences/00/classes/000000.label"
     )
     points = np.fromfile(scans[0], np.float32).reshape(-1, 4)
-    rings = np.zeros((len(points), 1), np.float32)
-    np.hstack([points, rings]).tofile(folder / "rings.bin")
+    # Of an odd number of rows, five columns are no whole rows of four.
+    odd = points[: len(points) // 2 * 2 - 1]
+    np.hstack([odd, np.zeros((len(odd), 1), np.float32)]).tofile(folder / "rings.bin")
     shutil.copy(next(simulated.glob("bag/*.mcap")), folder / "drive.mcap")
     shutil.copy(KEPT / "outdet.onnx", folder / "model.onnx")
     shutil.copy(KEPT / "outdet.ckpt", folder / "model.ckpt")
@@ -105,8 +113,8 @@ def _put_troubles(folder: Path) -> None:
     dry.tofile(folder / "dry.bin")
     dry[np.linalg.norm(dry[:, :3], axis=1) < FOG_ENDS].tofile(folder / "fog.bin")
     (cloud * np.float32([1000, 1000, 1000, 1])).tofile(folder / "millimetres.bin")
-    # Where the vehicle stands five times, three metres apart.
-    along = [cloud + np.float32([3 * place, 0, 0, 0]) for place in range(5)]
+    # Where the vehicle stands five times, five metres apart.
+    along = [cloud + np.float32([5 * place, 0, 0, 0]) for place in range(5)]
     np.concatenate(along).tofile(folder / "map.bin")
     for name in ("morning", "recording/velodyne", "recording/truth"):
         (folder / name).mkdir(parents=True)
