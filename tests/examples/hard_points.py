@@ -38,7 +38,7 @@ def hard_points() -> Float32s:
         [9, 2, 1, 2e7],
     ]
     no_returns = [[3.0, 0, 0.5, 0]] * 60
-    parts = (scene(500), lattice, again, zeros, behind, no_returns, [[-1, -1, -1, 5]], invalid)
+    parts = (scene(250), lattice, again, zeros, behind, no_returns, [[-1, -1, -1, 5]], invalid)
     points = np.concatenate([np.asarray(part, np.float32) for part in parts])
     return generator.permutation(points)
 
@@ -50,9 +50,9 @@ def hard_scans() -> dict[str, Float32s]:
     one_intensity[np.isfinite(hard[:, 3]) & (hard[:, 3] >= 0), 3] = 7
     one_intensity = one_intensity[one_intensity[:, 3] == 7]
     unknown[:, 3] = np.nan
-    twice = np.concatenate([scene(500), scene(500)])
-    rays = twice[500:, :3] / np.linalg.norm(twice[500:, :3], axis=1, keepdims=True)
-    twice[500:, :3] += 0.004 * rays
+    twice = np.concatenate([scene(250), scene(250)])
+    rays = twice[250:, :3] / np.linalg.norm(twice[250:, :3], axis=1, keepdims=True)
+    twice[250:, :3] += 0.004 * rays
     return {
         "ties, copies, invalid rows": hard,
         "written twice": np.random.default_rng(4).permutation(twice).astype(np.float32),

@@ -49,7 +49,7 @@ def test_it_judges_candidates_as_well(derain_onnx, judging_candidates, tmp_path)
 def test_and_images_whichever_way_their_scores_come_back(
     derain_onnx, model_of_images, tmp_path
 ) -> None:
-    judged_alike(derain_onnx, tmp_path, model_of_images, [*SCANS.values(), scene(800)])
+    judged_alike(derain_onnx, tmp_path, model_of_images, [*SCANS.values(), scene(400)])
 
 
 @pytest.mark.parametrize("text", [b'"numpy"', b'"sha256"'], ids=["versions", "checksum"])

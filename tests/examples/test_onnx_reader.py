@@ -57,7 +57,7 @@ def test_of_neighbours_it_makes_what_derain_makes(reader, judging_candidates) ->
 def test_of_images_it_makes_what_derain_makes_whichever_way_scores_come_back(
     reader, model_of_images
 ) -> None:
-    agree(reader, model_of_images, *SCANS.values(), scene(800))
+    agree(reader, model_of_images, *SCANS.values(), scene(400))
 
 
 @pytest.mark.parametrize(
