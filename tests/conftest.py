@@ -220,6 +220,20 @@ def onnx_model(judging) -> Path:
 
 
 @pytest.fixture(scope="session")
+def candidates() -> "Candidates":
+    """Bounds that leave out some points of every kind."""
+    from derain.views.candidates import Bound, Candidates
+
+    return Candidates((Bound("range", least=2.0, most=25.0), Bound("intensity", most=40.0)))
+
+
+@pytest.fixture(scope="session")
+def judging_candidates(judging, candidates) -> Path:
+    """The same network, exported with those candidates."""
+    return judging("candidates.onnx", candidates, 2)
+
+
+@pytest.fixture(scope="session")
 def small_grid() -> dict[str, Any]:
     """A grid of few pixels, its sides no multiples of 16: most points of a scene lose theirs."""
     return {"rows": 18, "columns": 60, "inclination": [-30.0, 20.0]}

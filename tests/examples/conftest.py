@@ -15,16 +15,9 @@ import pytest
 from derain.export.onnx_file import with_metadata
 from derain.export.runtime import Derainer
 from derain.views.back_projection import BACK_PROJECTIONS
-from derain.views.candidates import Bound, Candidates
 
 from .cpp import Program, build, program
 from .made_up_ros import EXAMPLE, DiagnosticArray, DiagnosticStatus, KeyValue, PointCloud2
-
-
-@pytest.fixture(scope="session")
-def candidates() -> Candidates:
-    """Bounds that leave out some points of every kind."""
-    return Candidates((Bound("range", least=2.0, most=9.0), Bound("intensity", most=99.0)))
 
 
 @pytest.fixture(scope="session")
@@ -50,12 +43,6 @@ def derain_onnx(built) -> Program:
             "ONNXRUNTIME_ROOT to an unpacked release"
         )
     return program(built / "derain_onnx")
-
-
-@pytest.fixture(scope="session")
-def judging_candidates(judging, candidates) -> Path:
-    """3D-OutDet of random weights, exported with those candidates."""
-    return judging("examples_candidates.onnx", candidates, 1)
 
 
 @pytest.fixture(params=product(BACK_PROJECTIONS, [None, (-60.0, 75.0)], [True, False]), ids=str)

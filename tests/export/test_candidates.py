@@ -2,7 +2,6 @@
 
 from copy import deepcopy
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,18 +19,11 @@ from derain.views.candidates import Bound, Candidates
 
 from .conftest import shapes_of
 
-NEAR_AND_DIM = Candidates((Bound("range", most=25.0), Bound("intensity", most=40.0)))
 WADS = load_card("wads")
 
 
-@pytest.fixture(scope="module")
-def judging_candidates(judging) -> Path:
-    """The same network as ``onnx_model``, exported with candidates."""
-    return judging("candidates.onnx", NEAR_AND_DIM, 2)
-
-
 def test_its_answer_for_candidates_is_bit_for_bit_that_of_the_model_without(
-    onnx_model, judging_candidates
+    onnx_model, judging_candidates, candidates
 ) -> None:
     of_all, of_candidates = Derainer(onnx_model, 1), Derainer(judging_candidates, 1)
     judged = 0
@@ -39,7 +31,7 @@ def test_its_answer_for_candidates_is_bit_for_bit_that_of_the_model_without(
         # Rows at one position have one score; its first row decides whether it is a candidate.
         first = of_all.view(scan)
         among = np.zeros(len(scan), bool)
-        among[first.judged] = NEAR_AND_DIM.among(scan)[first.first][first.inverse[first.judged]]
+        among[first.judged] = candidates.among(scan)[first.first][first.inverse[first.judged]]
         expected = np.where(among, of_all.probability(scan), np.float32(0))
         np.testing.assert_array_equal(of_candidates.probability(scan), expected, err_msg=name)
         judged += int(among.sum())
