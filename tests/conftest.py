@@ -37,8 +37,9 @@ if TYPE_CHECKING:
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 
-# No test asserts a time, of which a busy machine takes any.
-settings.register_profile("untimed", deadline=None)
+# No test asserts a time, of which a busy machine takes any. Every run draws other examples, so that
+# few a run are many over all runs.
+settings.register_profile("untimed", deadline=None, max_examples=50)
 settings.load_profile("untimed")
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
@@ -69,7 +69,6 @@ def mean_of_nearest(xyz: Float32s, neighbours: int) -> Floats:
     return np.sort(pairs(xyz), axis=1)[:, 1:neighbours].mean(axis=1)
 
 
-@settings(max_examples=100)
 @given(gridded, counts, st.sampled_from([0.0, 0.5, 1.0, 2.5, 7.3]))
 def test_ror_counts_the_points_within_its_radius(cloud, neighbours, radius) -> None:
     scan = Scan.of(cloud)
@@ -88,7 +87,6 @@ def test_a_point_at_exactly_the_radius_is_within() -> None:
     assert ror.judge(view)[view.inverse].tolist() == expected
 
 
-@settings(max_examples=80)
 @given(
     cloud=clouds,
     neighbours=counts,
@@ -109,7 +107,6 @@ def test_dror_counts_the_points_within_a_radius_that_grows_with_range(
     check(scan, DROR(neighbours, 1.5, azimuth, minimum, variant), last, radius)
 
 
-@settings(max_examples=80)
 @given(cloud=clouds, neighbours=counts, deviations=st.sampled_from([0.0, 0.01, 1.5]))
 def test_sor_compares_mean_distances_with_their_mean_and_deviation(
     cloud, neighbours, deviations
@@ -124,7 +121,6 @@ def test_sor_compares_mean_distances_with_their_mean_and_deviation(
     check(scan, SOR(neighbours, deviations), mean, np.full(len(mean), limit))
 
 
-@settings(max_examples=80)
 @given(cloud=clouds, neighbours=counts, growth=st.sampled_from([0.05, 0.4]))
 def test_dsor_lets_the_limit_grow_with_range(cloud, neighbours, growth) -> None:
     scan = Scan.of(cloud)
@@ -138,7 +134,6 @@ def test_dsor_lets_the_limit_grow_with_range(cloud, neighbours, growth) -> None:
     check(scan, DSOR(neighbours, 0.3, growth), mean, limit * growth * distance)
 
 
-@settings(max_examples=50)
 @given(scattered, counts, st.sampled_from([0.0, 3.0, 40.0]))
 def test_ssr_takes_the_norm_of_the_spectrum_of_a_neighbourhood(
     cloud, neighbours, threshold
@@ -157,7 +152,6 @@ def test_ssr_takes_the_norm_of_the_spectrum_of_a_neighbourhood(
     check(scan, SSR(neighbours, threshold), -norm, np.full(len(xyz), -threshold))
 
 
-@settings(max_examples=80)
 @given(cloud=clouds, neighbours=counts, spare=st.integers(0, 5))
 def test_one_wide_view_serves_every_filter_as_its_own_does(cloud, neighbours, spare) -> None:
     scan = Scan.of(cloud)

@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from derain.errors import InputError
@@ -17,7 +17,6 @@ def read(value: object) -> PrecipitationSpans:
     return PrecipitationSpans.of(Entry("world.yaml", "precipitation", value))
 
 
-@settings(max_examples=50)
 @given(seed=st.integers(0, 2**32), name=st.sampled_from(sorted(KINDS)))
 def test_every_number_is_within_its_span_or_switched_off(seed, name) -> None:
     kind = KINDS[name]
