@@ -43,9 +43,15 @@ settings.register_profile("untimed", deadline=None, max_examples=50)
 settings.load_profile("untimed")
 
 
+def pytest_collection() -> None:
+    """Collects no garbage while modules are loaded, which make none."""
+    gc.disable()
+
+
 def pytest_collection_finish() -> None:
     """Keeps what is loaded out of garbage collection, of which every run would go through it."""
     gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="session")
