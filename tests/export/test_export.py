@@ -236,7 +236,8 @@ def test_further_channels_are_seen_and_proved_and_missing_ones_are_their_mean(
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("recorded", recorded(3))])
     torch.manual_seed(0)
     model = OutDet(channels=("x", "y", "z", "intensity", *EXTRA), neighbours=3).eval()
-    model.adopt(model.spec_for(replace(load_card("wads"), extra=EXTRA)))
+    wads = load_card("wads")
+    model.adopt(model.spec_for(replace(wads, moments=wads.moments | EXTRA)))
     export(model, tmp_path / "model.onnx")
     derainer, scan = Derainer(tmp_path / "model.onnx", 1), recorded(7)
     assert derainer.view.neighbours == 3

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -109,7 +109,6 @@ def by_loop(
     return rain, totals
 
 
-@settings(max_examples=150)
 @given(
     st.integers(0, 2**32 - 1), st.integers(1, 60), st.integers(1, 8), st.sampled_from([0, 0.3, 2])
 )
@@ -133,7 +132,6 @@ def test_the_sweep_goes_once_around_from_behind_where_y_is_any_zero() -> None:
     assert _along_the_sweep(xyz).tolist() == [3, 1, 4, 0, 2]
 
 
-@settings(max_examples=100)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.integers(4, 12), st.floats(0.3, 30))
 def test_the_published_variant_follows_its_formulas(seed, points, neighbours, size) -> None:
     generator = np.random.default_rng(seed)

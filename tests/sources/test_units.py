@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from contents import contents
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from recorded_scenes import write_drive
 from small_bags import small_bag
@@ -106,7 +106,6 @@ def recording() -> Source:
     return derain.Frames.of_scans([scene(60, seed=seed) for seed in range(SCANS)])
 
 
-@settings(max_examples=100)
 @given(
     bad=st.frozensets(st.integers(0, SCANS - 1)),
     block=st.integers(1, SCANS),

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
@@ -23,7 +23,6 @@ def of_one(xyz: Floats) -> float:
     return float(scatter_through_space(xyz, np.arange(len(xyz))[None])[0])
 
 
-@settings(max_examples=200)
 @given(clouds)
 def test_it_is_the_share_of_the_smallest_eigenvalue(xyz) -> None:
     if np.ptp(xyz, axis=0).max() > 1e-3:  # below, the mean of far numbers rounds it away

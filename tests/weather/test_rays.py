@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from derain.files import read_scan
@@ -48,7 +48,6 @@ def counted_one_by_one(returns: list[Return]) -> Ints:
     return counts
 
 
-@settings(max_examples=200)
 @given(returns_of_rays, st.integers(0, 2**32 - 1))
 def test_a_ray_ends_at_its_first_drop_or_else_where_it_was_seen_last(returns, seed) -> None:
     # Of bins, where float32 is next to the border of one, either may be right.
