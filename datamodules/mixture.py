@@ -73,7 +73,7 @@ class Mixture(ScanDataModule):
             if name not in parts:
                 raise InputError(f"part '{name}'", "there is none", f"Parts: {', '.join(parts)}.")
         for name, weight in weights.items():
-            Entry("weights", name, weight).positive()
+            Entry("weights", name, float(weight)).positive()  # also of NumPy
         if loading.intensity_scale != 1:
             raise InputError(
                 "loading.intensity_scale", "would be that of all parts", "Give it to each part."

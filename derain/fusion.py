@@ -7,7 +7,7 @@ import numpy as np
 import small_gicp
 
 from derain.errors import InputError
-from derain.files.extrinsics import moved
+from derain.files.extrinsics import check_rigid, moved
 from derain.scan import Array, Float32s, Floats, Ints, Scan
 from derain.system.cores import usable_cores
 from derain.views.morton import distinct_rows
@@ -80,7 +80,9 @@ def fuse(
     Raises:
         InputError: A channel that the radar frame, not being empty, lacks, or one of
             ``MERGED_COLUMNS``.
+        ValueError: A motion that is not rigid.
     """
+    check_rigid(extrinsics)
     for name in channels:
         if name in MERGED_COLUMNS:
             raise InputError(name, "is a column of the merged cloud itself", "Leave it out.")

@@ -89,6 +89,8 @@ class Spec:
             _view_of(entry.members()["view"], spec)
         except InputError as error:
             remedy = "Upgrade derain, or export it again."
+            if GONE in error.reason:
+                remedy = f"Train it again without {GONE}."
             raise InputError(source, f"{error.subject}: {error.reason}", remedy) from error
         return spec
 
@@ -162,7 +164,7 @@ def _channels(entry: Entry) -> tuple[str, ...]:
         raise entry.fault(f"more than {MOST_CHANNELS} channels", "Name fewer.")
     channels = entry.texts()
     if GONE in channels:
-        raise entry.fault(f"the channel {GONE} is gone: train it again without", "Leave it out.")
+        raise entry.fault(f"the channel {GONE} is no longer computed", "Leave it out.")
     return channels
 
 

@@ -92,6 +92,11 @@ def test_a_file_with_channels_names_them_and_marks_the_sensor_of_each_point(tmp_
     assert again.valid.all()
 
 
+def test_a_motion_that_is_not_rigid_is_refused() -> None:
+    with pytest.raises(ValueError, match="not a rotation"):
+        fuse(Scan.of(scene(5)), radar_frame(), 2 * HERE)
+
+
 def test_a_scan_without_a_radar_frame_stays_alone() -> None:
     lidar = Scan.of(scene(20)).with_label(np.ones(20, np.int64))
     fused = fuse(lidar, NO_DETECTIONS, PLACE, channels=["rcs"])

@@ -109,7 +109,7 @@ NAN, HUGE = float("nan"), 10**400
         *(({"threshold": wrong}, "threshold") for wrong in (NAN, 1.1)),
         *(({"channels": wrong}, "channels") for wrong in ("xyzi", ["x"] * 4)),
         ({"channels": ["x"] * (MOST_CHANNELS + 1)}, "more than 64 channels"),
-        ({"channels": ["x", "y", "z", "dual_return"]}, "dual_return is gone: train it again"),
+        ({"channels": ["x", "y", "z", "dual_return"]}, "Train it again without dual_return"),
         ({"channels": [], "units": [], "mean": [], "std": []}, "channels .* are none"),
         *(({name: [*SPEC.as_dict()[name]][:-1]}, "differ in number") for name in MEANS_OF),
         *(({"rule": wrong}, "rule") for wrong in (None, {"a": HUGE})),

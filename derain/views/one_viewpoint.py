@@ -115,8 +115,8 @@ def _almost_empty_issue(scan: Scan) -> ScanIssue:
     return ScanIssue(
         "almost empty",
         f"{np.count_nonzero(scan.valid):,} of {len(scan):,} rows are points that can be judged: "
-        "too few to check the scan (is the sensor covered, or the file cut short? From coordinates "
-        "of a map, subtract the sensor's position)",
+        "too few to check the scan. The sensor may be covered or the file cut short; from "
+        "coordinates of a map (UTM), subtract the sensor's position",
     )
 
 

@@ -72,6 +72,7 @@ class Resumption(lightning.Callback):
             "lr_schedulers": [each.scheduler.state_dict() for each in trainer.lr_scheduler_configs],
             type(precision).__qualname__: precision.state_dict(),
         }
+        checkpoint.pop("native_amp_scaling_state", None)  # of Lightning before 1.6
         whole = {name: Entry(str(trainer.ckpt_path), name, checkpoint.get(name)) for name in own}
         for name in own.keys() & checkpoint.keys():
             checkpoint[name] = matching_state(whole[name], own[name])

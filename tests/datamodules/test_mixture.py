@@ -81,7 +81,7 @@ def test_a_scan_that_is_drawn_twice_is_augmented_in_two_ways() -> None:
 
 
 def test_statistics_are_those_of_a_scan_that_is_drawn() -> None:
-    data = mixture(weights={"snow": 1.0, "spray": 3.0})
+    data = mixture(weights={"snow": 1.0, "spray": np.float32(3)})
     data.complete_card()
     points = {
         name: np.concatenate([np.c_[s.xyz, s.intensity] for s in scans(number, [0], first)])
