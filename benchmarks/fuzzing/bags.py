@@ -23,6 +23,8 @@ from benchmarks.fuzzing.false_indexes import (
     chunks_times,
     ros1_with_index,
     stating,
+    summarised,
+    summary_of,
     with_summary,
 )
 from benchmarks.fuzzing.formats import BOMB, POINTS
@@ -145,7 +147,6 @@ def _mcap() -> list[bytes]:
         _written("mcap", _messages("mcap")),
         *(_mcap_by_makers(compression=kind) for kind in kinds),
         _mcap_by_makers(use_chunking=False),
-        _mcap_by_makers(index_types=mcap.writer.IndexType.NONE, use_statistics=False),
     ]
 
 
@@ -354,13 +355,36 @@ def _empty_messages() -> bytes:
 
 
 def _of_chunks(chunks: Sequence[bytes]) -> bytes:
-    """A file of chunks, without a summary."""
+    """A file of chunks of one time, with the topics and the numbers of messages of a sound file."""
     builder = RecordBuilder()
     mcap.records.Header("ros2", "").write(builder)
-    header = builder.end()
+    data = MCAP_MAGIC + builder.end()
+    summary = [
+        each
+        for each in summary_of(_mcap()[1])
+        if isinstance(each, mcap.records.Schema | mcap.records.Channel | mcap.records.Statistics)
+    ]
+    for chunk in chunks:
+        summary.append(
+            mcap.records.ChunkIndex(
+                chunk_length=len(chunk),
+                chunk_start_offset=len(data),
+                compression="",
+                compressed_size=0,
+                message_end_time=START,
+                message_index_length=0,
+                message_index_offsets={},
+                message_start_time=START,
+                uncompressed_size=0,
+            )
+        )
+        data += chunk
+    for each in summary:
+        if isinstance(each, mcap.records.Statistics):
+            each.chunk_count = len(chunks)
+            each.attachment_count = each.metadata_count = 0
     mcap.records.DataEnd(0).write(builder)
-    mcap.records.Footer(0, 0, 0).write(builder)
-    return MCAP_MAGIC + header + b"".join(chunks) + builder.end() + MCAP_MAGIC
+    return summarised(data + builder.end(), summary)
 
 
 def _megabytes() -> Iterator[bytes]:

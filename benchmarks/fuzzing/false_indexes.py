@@ -5,33 +5,41 @@ from collections.abc import Callable, Iterable
 from io import BytesIO
 
 from mcap.data_stream import RecordBuilder
-from mcap.records import Channel, ChunkIndex, Footer, McapRecord, Statistics, SummaryOffset
+from mcap.records import ChunkIndex, Footer, McapRecord, Statistics, SummaryOffset
 from mcap.stream_reader import StreamReader
 
 MCAP_MAGIC = b"\x89MCAP0\r\n"
 FOOTER_RECORD = struct.Struct("<BQQQI")
 
 
-def with_summary(
-    file: bytes, change: Callable[[list[McapRecord]], Iterable[McapRecord]], data: bytes = b""
-) -> bytes:
+def with_summary(file: bytes, change: Callable[[list[McapRecord]], Iterable[McapRecord]]) -> bytes:
     """An MCAP file with another summary, which has no checksum.
 
     Args:
         file: The file.
         change: Makes the records of the summary out of those that there are.
-        data: Records to be added to the end of the data.
     """
-    footer = len(file) - len(MCAP_MAGIC) - FOOTER_RECORD.size
-    start = FOOTER_RECORD.unpack_from(file, footer)[2]
-    records = StreamReader(BytesIO(file[start:]), skip_magic=True).records
-    kept = [each for each in records if not isinstance(each, (Footer, SummaryOffset))]
+    return summarised(file[: _summary_start(file)], change(summary_of(file)))
+
+
+def summary_of(file: bytes) -> list[McapRecord]:
+    """The records of the summary of an MCAP file."""
+    records = StreamReader(BytesIO(file[_summary_start(file) :]), skip_magic=True).records
+    return [each for each in records if not isinstance(each, (Footer, SummaryOffset))]
+
+
+def summarised(data: bytes, summary: Iterable[McapRecord]) -> bytes:
+    """An MCAP file of its data, from the magic bytes on, and the records of its summary."""
     builder = RecordBuilder()
-    for each in change(kept):
+    for each in summary:
         each.write(builder)
-    Footer(start + len(data), 0, 0).write(builder)
-    data_end = start - 13  # kind, size and checksum
-    return file[:data_end] + data + file[data_end:start] + builder.end() + MCAP_MAGIC
+    Footer(len(data), 0, 0).write(builder)
+    return data + builder.end() + MCAP_MAGIC
+
+
+def _summary_start(file: bytes) -> int:
+    footer = len(file) - len(MCAP_MAGIC) - FOOTER_RECORD.size
+    return int(FOOTER_RECORD.unpack_from(file, footer)[2])
 
 
 def stating(messages: int) -> Callable[[list[McapRecord]], list[McapRecord]]:
@@ -70,18 +78,6 @@ def without_a_chunk(records: list[McapRecord]) -> list[McapRecord]:
             for channel in left_out.message_index_offsets:
                 each.channel_message_counts[channel] -= 1
     return [each for each in records if each is not left_out]
-
-
-def renamed(topic: str, name: str) -> Callable[[list[McapRecord]], list[McapRecord]]:
-    """A summary in which a topic has another name."""
-
-    def change(records: list[McapRecord]) -> list[McapRecord]:
-        for each in records:
-            if isinstance(each, Channel) and each.topic == topic:
-                each.topic = name
-        return records
-
-    return change
 
 
 def ros1_with_index(file: bytes, *, topics: int = 0, chunk_times: int = 1) -> bytes:

@@ -191,7 +191,7 @@ class Bag:
             stored = None
             if topic is None and start is None:
                 is_mcap = self.storage == "mcap"
-                stored = reader.stored_messages() if is_mcap else stored_messages(reader)
+                stored = reader.message_count if is_mcap else stored_messages(reader)
             number = 0
             for connection, time, data, *more in reader.messages(chosen, start=start):
                 number += 1

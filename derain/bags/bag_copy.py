@@ -124,8 +124,9 @@ class BagCopy:
 
 
 def written_name(bag: Bag) -> str:
-    """Name of the copy of a bag: of ROS 1 a file, of ROS 2 a folder."""
-    return bag.path.name if bag.is_ros1 else stem(bag.path)
+    """Name of the copy of a bag: a folder of a folder and of a database, else a file."""
+    is_file = bag.metadata is None and bag.storage != "sqlite3"
+    return bag.path.name if is_file else stem(bag.path)
 
 
 def _writer(bag: Bag, reader: Any, path: Path) -> Any:

@@ -1,21 +1,51 @@
-"""Reads bags in MCAP, with the interface of the library that reads the other storages."""
+"""Reads bags in MCAP, with the interface of the library that reads the other storages.
+
+The library of MCAP's makers parses the records. Chunks are unpacked here, for the library has no
+bound on what one of lz4 unpacks to. A file is read by its index.
+
+Source: the MCAP specification, version 0 (https://mcap.dev/spec).
+"""
 
 import heapq
+import os
 from array import array
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Collection, Container, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO
 
 import numpy as np
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, ChunkIndex, Message, Metadata, Schema
+from mcap.reader import FOOTER_SIZE
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    Message,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+)
+from mcap.stream_reader import StreamReader, get_chunk_data_stream
 
-from derain.bags.mcap_records import McapRecords
+from derain.bags.unpacking import check_size, unpack
+from derain.scan import Ints
 
-# Bytes that messages of chunks that overlap in time may take together.
+MAGIC = b"\x89MCAP0\r\n"
+
+# Bytes of a message's record before its data: kind and size; channel, number and times.
+MESSAGE_HEAD = 9 + 22
+
+# Bytes that chunks that overlap in time may unpack to together.
 MOST_HELD = 2**29
 
 
@@ -40,57 +70,49 @@ class McapConnection:
     msgcount: int = field(default=0, compare=False)
 
 
-class ChunkPlace(NamedTuple):
-    """The place of a chunk.
-
-    Attributes:
-        start: The earliest time in it, nanoseconds.
-        end: The latest.
-        offset: Of its record in the file.
-        channels: Those in it; None where the file does not list them.
-        compression: ``""``, ``lz4`` or ``zstd``.
-    """
-
-    start: int
-    end: int
-    offset: int
-    channels: frozenset[int] | None
-    compression: str
-
-
 class McapFile:
     """A file of MCAP.
-
-    A file whose summary is missing or incomplete is read through once.
 
     Args:
         file: The file, open.
 
     Attributes:
-        records: Its records by their places.
+        profile: The header's name for the kind of recording, such as ``ros2``.
         schemas: Its schemas by their numbers.
         channels: Its channels by their numbers.
-        counts: Number of messages of each channel.
-        start: The earliest time of a message, nanoseconds.
-        end: The latest.
-        chunks: Places of the chunks.
+        chunks: The index of its chunks, in the order of the file.
+        statistics: Its numbers of records, and its times.
 
     Raises:
-        ValueError: A damaged file.
+        ValueError: No MCAP, one that is cut off or damaged, or one without a whole index.
         OSError: It cannot be read.
     """
 
     def __init__(self, file: BinaryIO) -> None:
-        self.records = McapRecords(file)
-        self.schemas: dict[int, Schema] = {}
-        self.channels: dict[int, Channel] = {}
-        self.counts: Counter[int] = Counter()
-        self.start, self.end = 2**63 - 1, 0
-        self.chunks: list[ChunkPlace] = []
-        # Times and places of messages that are in no chunk.
-        self._times, self._offsets = array("Q"), array("Q")
-        if not self._read_summary():
-            self._scan()
+        self._file = file
+        self._size = os.fstat(file.fileno()).st_size
+        self._held = 0
+        end = max(self._size - len(MAGIC), 0)
+        for place in (0, end):
+            file.seek(place)
+            if file.read(len(MAGIC)) != MAGIC:
+                raise ValueError("it does not begin and end with the magic bytes of MCAP")
+        self.profile: str = self._read(len(MAGIC), Header).profile
+        footer_at = end - FOOTER_SIZE
+        summary = defaultdict[type, list[Any]](list)
+        for record in self._records(self._read(footer_at, Footer).summary_start or footer_at):
+            summary[type(record)].append(record)
+        self.schemas: dict[int, Schema] = {each.id: each for each in summary[Schema]}
+        self.channels: dict[int, Channel] = {each.id: each for each in summary[Channel]}
+        self._attachments = {each.offset for each in summary[AttachmentIndex]}
+        self._metadata = {each.offset for each in summary[MetadataIndex]}
+        # A chunk that is named twice would be unpacked again and again.
+        chunks = {each.chunk_start_offset: each for each in summary[ChunkIndex]}
+        self.chunks: list[ChunkIndex] = [chunks[offset] for offset in sorted(chunks)]
+        indexed = len(chunks), len(self._attachments), len(self._metadata)
+        if not summary[Statistics] or indexed != _stated(summary[Statistics][0]):
+            raise ValueError("its index is missing or not whole")
+        self.statistics: Statistics = summary[Statistics][0]
 
     def connections(self) -> dict[int, McapConnection]:
         """Its channels by their numbers, without the counts of their messages.
@@ -117,140 +139,98 @@ class McapFile:
         """Messages in the order of their times; of one time, in the order of the file.
 
         Args:
-            channels: Those of interest. If they are all of the file, a message of a channel that it
-                does not define is damage, and is not left out.
+            channels: Those of interest.
             start: The first time of interest, nanoseconds.
 
         Raises:
             ValueError: A damaged file.
         """
-        whole = all(number in channels for number in self.channels)
-        parts = (part(channels, start, whole) for part in (self._in_chunks, self._outside_chunks))
-        for _, _, message in heapq.merge(*parts, key=lambda found: found[:2]):
-            yield message
+        parts = [
+            self._in_chunk(index, channels, start)
+            for index in self.chunks
+            if index.message_end_time >= start and _may_hold(index, channels)
+        ]
+        if not self.chunks:
+            parts = [self._outside_chunks(channels, start)]
+        for _, message in heapq.merge(*parts, key=lambda found: found[0]):
+            if message is not None:
+                yield message
 
-    def check_whole(self) -> None:
-        """Checks that reading all messages leaves nothing of the file unread.
+    def attachments_and_metadata(self) -> Iterator[Attachment | Metadata]:
+        """Every record that is neither a message nor about messages.
 
         Raises:
-            ValueError: A wrong checksum of the data, or a summary that differs from them in chunks,
-                messages, channels or schemas.
+            ValueError: The index names a place that has none.
         """
-        chunks, messages = set(), 0
-        for kind, offset, _ in self.records.places():
-            if kind == Opcode.CHUNK:
-                chunks.add(offset)
-            elif kind == Opcode.MESSAGE:
-                messages += 1
-            elif kind in (Opcode.SCHEMA, Opcode.CHANNEL):
-                self._define(self.records.read(offset, kind))
-            elif kind == Opcode.DATA_END:
-                self.records.check_data(offset)
-        if chunks != {chunk.offset for chunk in self.chunks}:
-            raise ValueError("its summary does not match its chunks")
-        if messages != len(self._times):
-            raise ValueError(f"its summary lacks {messages:,} messages that are in no chunk")
+        for offset in sorted(self._attachments):
+            yield self._read(offset, Attachment)
+        for offset in sorted(self._metadata):
+            yield self._read(offset, Metadata)
 
-    def _read_summary(self) -> bool:
-        """Reads the summary, and returns whether it locates every message."""
-        statistics, chunks = None, list[ChunkPlace]()
-        for kind, record in self.records.in_summary():
-            if kind == Opcode.CHUNK_INDEX:
-                channels = frozenset(record.message_index_offsets) or None
-                chunks.append(_place_of(record, record.chunk_start_offset, channels))
-            elif kind == Opcode.STATISTICS:
-                statistics = record
-            else:
-                self._define(record)
-        if len({chunk.offset for chunk in chunks}) < len(chunks):
-            raise ValueError("its summary names a chunk more than once")
-        if statistics is None or len(chunks) != statistics.chunk_count:
-            return False
-        counts = Counter(statistics.channel_message_counts)
-        if not counts.keys() <= self.channels.keys() or (statistics.message_count and not chunks):
-            return False
-        self.counts, self.chunks = counts, chunks
-        self.start, self.end = statistics.message_start_time, statistics.message_end_time
-        return True
+    def _records(self, offset: int) -> Iterator[Any]:
+        """Records from a place on; chunks are not unpacked."""
+        self._file.seek(offset)
+        reader = StreamReader(
+            self._file, skip_magic=True, emit_chunks=True, record_size_limit=self._size
+        )
+        return reader.records
 
-    def _scan(self) -> None:
-        """Reads through the whole file."""
-        for kind, offset, _ in self.records.places():
-            if kind == Opcode.CHUNK:
-                chunk, channels = self.records.read(offset, kind), set()
-                for inner, record in self.records.in_chunk(chunk):
-                    if inner == Opcode.MESSAGE:
-                        self._count(record)
-                        channels.add(record.channel_id)
-                    else:
-                        self._define(record)
-                self.chunks.append(_place_of(chunk, offset, frozenset(channels)))
-            elif kind == Opcode.MESSAGE:
-                message = self.records.read(offset, kind)
-                self._count(message)
-                self._times.append(message.log_time)
-                self._offsets.append(offset)
-            elif kind in (Opcode.SCHEMA, Opcode.CHANNEL):
-                self._define(self.records.read(offset, kind))
+    def _read(self, offset: int, kind: type) -> Any:
+        """The record at a place.
 
-    def _count(self, message: Message) -> None:
-        self.counts[message.channel_id] += 1
-        self.start, self.end = min(self.start, message.log_time), max(self.end, message.log_time)
+        Raises:
+            ValueError: One of another kind.
+        """
+        record = next(self._records(offset))
+        if not isinstance(record, kind):
+            raise ValueError(f"it has no {kind.__name__.lower()} at byte {offset:,}")
+        return record
 
-    def _define(self, record: Any) -> None:
-        """Notes a schema or a channel; a second one of its number must be the same."""
-        defined: dict[type, dict[int, Any]] = {Schema: self.schemas, Channel: self.channels}
-        known = defined.get(type(record))
-        if known is not None and known.setdefault(record.id, record) != record:
-            raise ValueError(f"it defines {type(record).__name__.lower()} {record.id} in two ways")
-
-    def _in_chunks(
-        self, channels: Container[int], start: int, whole: bool
-    ) -> Iterator[tuple[int, int, Message]]:
-        """Time, chunk and message; a chunk is unpacked when its time has come."""
-        waiting: list[tuple[int, int, int, Message | None]] = [
-            (chunk.start, chunk.offset, -1, None)
-            for chunk in self.chunks
-            if chunk.end >= start
-            and (whole or chunk.channels is None or any(c in channels for c in chunk.channels))
-        ]
-        heapq.heapify(waiting)
-        held = 0
-        while waiting:
-            time, offset, _, message = heapq.heappop(waiting)
-            if message is not None:
-                held -= len(message.data)
-                yield time, offset, message
-                continue
-            parts = self.records.in_chunk(self.records.read(offset, Opcode.CHUNK))
-            for number, (kind, record) in enumerate(parts):
-                if kind != Opcode.MESSAGE:
-                    self._define(record)
-                    if whole and kind not in (Opcode.SCHEMA, Opcode.CHANNEL):
-                        raise ValueError(f"a chunk holds a record that no chunk has (kind {kind})")
-                elif record.channel_id in channels:
-                    if record.log_time >= start:
-                        held += len(record.data)
-                        heapq.heappush(waiting, (record.log_time, offset, number, record))
-                elif whole:
-                    raise _undefined(record)
-            if held > MOST_HELD:
+    def _in_chunk(
+        self, index: ChunkIndex, channels: Container[int], start: int
+    ) -> Iterator[tuple[int, Message | None]]:
+        """Time and message; the first is None, so that no chunk is unpacked before its time."""
+        yield index.message_start_time, None
+        chunk = self._read(index.chunk_start_offset, Chunk)
+        size = chunk.uncompressed_size
+        check_size(size)
+        self._held += size
+        try:
+            if self._held > MOST_HELD:
                 raise ValueError(
-                    f"messages of more than {MOST_HELD // 10**6} MB in chunks of one time"
+                    f"more than {MOST_HELD // 10**6} MB are in chunks that overlap in time"
                 )
+            found = [
+                (message.log_time, message)
+                for message in _unpacked(chunk)
+                if message.channel_id in channels and message.log_time >= start
+            ]
+            yield from sorted(found, key=lambda each: each[0])
+        finally:
+            self._held -= size
 
     def _outside_chunks(
-        self, channels: Container[int], start: int, whole: bool
-    ) -> Iterator[tuple[int, int, Message]]:
-        """Time, place and message of those that are in no chunk."""
-        for index in np.argsort(np.asarray(self._times), kind="stable"):
-            if self._times[index] >= start:
-                offset = self._offsets[index]
-                message = self.records.read(offset, Opcode.MESSAGE)
+        self, channels: Container[int], start: int
+    ) -> Iterator[tuple[int, Message | None]]:
+        """Time and message of a file without chunks."""
+        times, offsets = self._places
+        for place in np.argsort(times, kind="stable"):
+            if times[place] >= start:
+                message = self._read(int(offsets[place]), Message)
                 if message.channel_id in channels:
-                    yield message.log_time, offset, message
-                elif whole:
-                    raise _undefined(message)
+                    yield message.log_time, message
+
+    @cached_property
+    def _places(self) -> tuple[Ints, Ints]:
+        """Time and offset of each message of a file without chunks, which has no index of them."""
+        times, offsets = array("Q"), array("Q")
+        for record in self._records(len(MAGIC)):
+            if isinstance(record, Message):
+                times.append(record.log_time)
+                offsets.append(self._file.tell() - len(record.data) - MESSAGE_HEAD)
+            elif isinstance(record, DataEnd):
+                break
+        return np.asarray(times), np.asarray(offsets)
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,24 +249,23 @@ class McapReader:
         counts = Counter[McapConnection]()
         for file in self.files:
             for number, connection in file.connections().items():
-                counts[connection] += file.counts[number]
+                counts[connection] += file.statistics.channel_message_counts.get(number, 0)
         return [replace(each, msgcount=count) for each, count in counts.items()]
 
     @property
     def message_count(self) -> int:
         """Number of messages."""
-        return sum(file.counts.total() for file in self.files)
+        return sum(file.statistics.message_count for file in self.files)
 
     @property
     def start_time(self) -> int:
         """Time at which the first message was recorded, nanoseconds; 0 where there is none."""
-        return min((file.start for file in self.files if file.counts.total()), default=0)
+        return min((each.message_start_time for each in self._filled), default=0)
 
     @property
     def duration(self) -> int:
         """Nanoseconds from the first to the last message."""
-        last = max((file.end for file in self.files if file.counts.total()), default=0)
-        return last - self.start_time
+        return max((each.message_end_time for each in self._filled), default=0) - self.start_time
 
     def messages(
         self, connections: Collection[McapConnection], start: int | None = None
@@ -311,26 +290,15 @@ class McapReader:
                 connection = channels[found.channel_id]
                 yield connection, found.log_time, found.data, found.publish_time, found.sequence
 
-    def stored_messages(self) -> int:
-        """Number of messages in the files, after a check that each of them can be read.
-
-        Raises:
-            ValueError: As for McapFile.check_whole.
-        """
-        for file in self.files:
-            file.check_whole()
-        return self.message_count
-
     def attachments_and_metadata(self) -> Iterator[Attachment | Metadata]:
-        """Every record that is neither a message nor about messages.
-
-        Raises:
-            ValueError: One is damaged.
-        """
+        """Those of all files; see :meth:`McapFile.attachments_and_metadata`."""
         for file in self.files:
-            for kind, offset, _ in file.records.places():
-                if kind in (Opcode.ATTACHMENT, Opcode.METADATA):
-                    yield file.records.read(offset, kind)
+            yield from file.attachments_and_metadata()
+
+    @property
+    def _filled(self) -> list[Statistics]:
+        """Statistics of the files with messages."""
+        return [file.statistics for file in self.files if file.statistics.message_count]
 
 
 @contextmanager
@@ -349,15 +317,42 @@ def mcap_reader(paths: Sequence[Path]) -> Iterator[McapReader]:
         yield McapReader([McapFile(file) for file in opened])
 
 
-def _place_of(
-    record: Chunk | ChunkIndex, offset: int, channels: frozenset[int] | None
-) -> ChunkPlace:
-    times = record.message_start_time, record.message_end_time
-    return ChunkPlace(*times, offset, channels, record.compression)
+def _stated(statistics: Statistics) -> tuple[int, int, int]:
+    """Numbers of chunks, attachments and records of metadata."""
+    return statistics.chunk_count, statistics.attachment_count, statistics.metadata_count
 
 
-def _undefined(message: Message) -> ValueError:
-    return ValueError(f"a message is of channel {message.channel_id}, which is not defined")
+def _may_hold(index: ChunkIndex, channels: Container[int]) -> bool:
+    """True if a chunk has messages of some channels, or does not list its channels."""
+    inside = index.message_index_offsets
+    return not inside or any(channel in channels for channel in inside)
+
+
+def _unpacked(chunk: Chunk) -> Iterator[Message]:
+    """The messages of a chunk.
+
+    Raises:
+        ValueError: It is damaged, or unpacks to other than it states.
+    """
+    content = unpack(chunk.data, chunk.compression)
+    if len(content) != chunk.uncompressed_size:
+        raise ValueError(
+            f"a chunk states {chunk.uncompressed_size:,} bytes, and unpacks to {len(content):,}"
+        )
+    plain = replace(chunk, compression="", data=content)
+    stream, size = get_chunk_data_stream(plain, validate_crc=True)
+    # The time of each message differs, so a chunk that unpacks to more records than it has bytes is
+    # made to fill the memory.
+    for _ in range(len(chunk.data)):
+        if stream.count >= size:
+            return
+        kind, length = stream.read1(), stream.read8()
+        if kind == Opcode.MESSAGE:
+            yield Message.read(stream, length)
+        else:
+            stream.read(length)
+    if stream.count < size:
+        raise ValueError(f"a chunk of {len(chunk.data):,} bytes has more records than that")
 
 
 def _long_name(type_: str) -> str:
