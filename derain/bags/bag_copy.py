@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from derain.bags.bag import Bag, Message
-from derain.bags.names import stem
+from derain.bags.names import written_name
 from derain.bags.rosbags_writer import RosbagsWriter
 from derain.bags.topics import Topic
 from derain.errors import InputError, reason_of
@@ -34,7 +34,7 @@ class BagCopy:
         reader = self._stack.enter_context(bag.opened())
         self._messages = bag.messages_of(reader)
         self._clouds = 0
-        self.path = folder / written_name(bag)
+        self.path = folder / written_name(bag.path, bag.metadata is None)
         with self._writing():
             self._writer = _writer(bag, reader, self.path)
             for connection in reader.connections:  # as many, and in the same order
@@ -121,12 +121,6 @@ class BagCopy:
                 f"its copy cannot be written ({reason_of(error)})",
                 "Choose a folder that is writable and has room; repair a bag that is damaged.",
             ) from error
-
-
-def written_name(bag: Bag) -> str:
-    """Name of the copy of a bag: a folder of a folder and of a database, else a file."""
-    is_file = bag.metadata is None and bag.storage != "sqlite3"
-    return bag.path.name if is_file else stem(bag.path)
 
 
 def _writer(bag: Bag, reader: Any, path: Path) -> Any:

@@ -11,8 +11,8 @@ from derain.errors import InputError
 from derain.files.reading import reading
 
 # Suffixes of files that are bags.
-ROS1_SUFFIX = ".bag"
-SUFFIXES = (ROS1_SUFFIX, ".mcap", ".db3")
+ROS1_SUFFIX, MCAP_SUFFIX, SQLITE_SUFFIX = ".bag", ".mcap", ".db3"
+SUFFIXES = (ROS1_SUFFIX, MCAP_SUFFIX, SQLITE_SUFFIX)
 
 # Files of ROS 2 that are compressed as a whole; their folder is the bag.
 COMPRESSED_SUFFIXES = (".mcap.zstd", ".db3.zstd")
@@ -122,3 +122,13 @@ def stem(bag: Path) -> str:
     """The name of a bag without the suffix of its storage."""
     path = Path(os.path.abspath(bag))
     return path.stem if path.suffix.lower() in SUFFIXES else path.name
+
+
+def written_name(bag: Path, is_file: bool) -> str:
+    """Name of the copy of a bag: of a folder and of a database a folder, else a file.
+
+    Args:
+        bag: Path of the bag.
+        is_file: True if it is a file.
+    """
+    return bag.name if is_file and bag.suffix.lower() != SQLITE_SUFFIX else stem(bag)

@@ -8,10 +8,10 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from derain.bags.bag_copy import BagCopy, written_name
+from derain.bags.bag_copy import BagCopy
 from derain.bags.cloud_message import CloudMessage
 from derain.bags.cloud_topic import CloudTopic, damaged_cloud
-from derain.bags.names import is_bag
+from derain.bags.names import is_bag, written_name
 from derain.bags.point_cloud import PointCloud
 from derain.errors import InputError
 from derain.files.atomic import temporary_folder, writing
@@ -75,7 +75,7 @@ class CleanedBags:
         self.options = options
         self.probability = probability
         self._targets = {
-            clouds: out / folder / written_name(clouds.bag)
+            clouds: out / folder / written_name(clouds.bag.path, clouds.bag.metadata is None)
             for clouds, folder in _whole_topics(source).items()
         }
         for clouds in self._targets:

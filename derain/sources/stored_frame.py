@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
-from derain.bags.names import ROS1_SUFFIX, stem
+from derain.bags.names import written_name
 from derain.errors import InputError
 from derain.files import read_scan
 from derain.scan import Floats, Scan
@@ -112,9 +112,9 @@ class StoredBag(StoredFrame):
 
     @property
     def written_path(self) -> Path:
-        """Path of its copy in the folder of results: of ROS 1 a file, of ROS 2 a folder."""
-        is_ros1 = self.path.suffix.lower() == ROS1_SUFFIX
-        return Path(self.prefix).parent / (self.path.name if is_ros1 else stem(self.path))
+        """Path of its copy in the folder of results."""
+        is_file = any(each.path == self.path for each in self.objects)
+        return Path(self.prefix).parent / written_name(self.path, is_file)
 
     def fetched(self, where: Mirror) -> list[FileFrame]:
         """Its clouds."""
