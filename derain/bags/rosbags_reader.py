@@ -1,14 +1,10 @@
 """Opens bags of ROS 1 and SQLite with rosbags, with bounds on the sizes that it reads."""
 
-import os
-from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
-from io import BytesIO
+from functools import partial
 from pathlib import Path
-from struct import Struct
-from typing import Any, BinaryIO
+from typing import Any
 
 from derain.bags.names import logs_of
 from derain.bags.unpacking import MOST_UNPACKED, unpack
@@ -23,15 +19,6 @@ LOG_HEAD = 28
 # The most topics of a bag, where each publisher of ROS 1 counts as one. The library's time grows
 # with their square, and a metadata.yaml that lists many more is too large to be read.
 MOST_TOPICS = 4096
-
-# Tables of a database of ROS 2.
-ROS2_TABLES = {"schema", "metadata", "topics", "message_definitions", "messages"}
-
-# Records of ROS 1 begin with the size of their header and the header, then the size of their data.
-# Source: the bag format 2.0 (http://wiki.ros.org/Bags/Format/2.0).
-RECORD_SIZE = Struct("<I")
-OP = b"\4\0\0\0op="
-OP_MESSAGE, OP_BAG_HEADER, OP_INDEX, OP_CHUNK, OP_CHUNK_INFO, OP_CONNECTION = range(2, 8)
 
 
 @contextmanager
@@ -51,10 +38,7 @@ def rosbags_reader(path: Path, is_ros1: bool) -> Iterator[Any]:
         reader = ROSBAGS.load(path, "rosbag1").Reader(path)
         reader.read_chunk_info = _each_chunk_once(reader.read_chunk_info)
         with reader:
-            entries = Counter(e.chunk_pos for index in reader.indexes.values() for e in index)
-            reader.chunks = {
-                place: _bounded(chunk, entries[place]) for place, chunk in reader.chunks.items()
-            }
+            reader.chunks = {place: _bounded(chunk) for place, chunk in reader.chunks.items()}
             yield reader
         return
     reader = ROSBAGS.load(path, "rosbag2").Reader(path)
@@ -68,88 +52,16 @@ def rosbags_reader(path: Path, is_ros1: bool) -> Iterator[Any]:
             reader.close()
 
 
-def other_tables(reader: Any) -> list[str]:
-    """Names of tables in the databases of a bag that are none of ROS 2.
-
-    Args:
-        reader: A reader of :func:`rosbags_reader`.
-    """
-    tables = "SELECT name FROM sqlite_schema WHERE type = 'table' AND name NOT LIKE 'sqlite_%'"
-    found = {name for each in _databases(reader) for (name,) in each.dbconn.execute(tables)}
-    return sorted(found - ROS2_TABLES)
-
-
 def stored_messages(reader: Any) -> int:
     """Number of messages in the files of a bag, also of topics that it does not list.
 
     Args:
         reader: A reader of :func:`rosbags_reader`.
-
-    Raises:
-        ValueError: A bag of ROS 1 with chunks or messages that its index does not name.
     """
-    if not hasattr(reader, "chunks"):
-        return sum(database.metadata.message_count for database in _databases(reader))
-    if reader.chunks.keys() != set(_chunk_places(reader.path)):
-        raise ValueError("its index does not name all chunks")
-    for chunk in reader.chunks.values():
-        if not chunk.decompressor.messages:  # otherwise unpacked, and so checked, by its messages
-            reader.bio.seek(chunk.datapos)
-            chunk.decompressor(reader.bio.read(chunk.datasize))
-    return sum(map(len, reader.indexes.values()))
-
-
-def _databases(reader: Any) -> list[Any]:
-    return list(getattr(reader.storage, "storages", [reader.storage]))
-
-
-@dataclass(frozen=True)
-class ChunkUnpacker:
-    """Unpacks a chunk of ROS 1.
-
-    Attributes:
-        compression: Name of the compression.
-        messages: Number of its messages in the index.
-    """
-
-    compression: str
-    messages: int
-
-    def __call__(self, data: bytes) -> bytes:
-        """Unpacks its bytes.
-
-        Raises:
-            ValueError: They are damaged, too many, or other messages than the index has.
-        """
-        content = unpack(data, self.compression)
-        found = sum(kind == OP_MESSAGE for _, kind in _records(BytesIO(content)))
-        if found != self.messages:
-            raise ValueError(f"its index has {self.messages:,} of {found:,} messages of a chunk")
-        return content
-
-
-def _records(file: BinaryIO) -> Iterator[tuple[int, int]]:
-    """Place and kind of consecutive records of ROS 1."""
-    while head := file.read(RECORD_SIZE.size):
-        place = file.tell() - RECORD_SIZE.size
-        (size,) = RECORD_SIZE.unpack(head)
-        header = file.read(size)
-        kind = header.partition(OP)[2][:1]
-        if not kind:
-            raise ValueError(f"a record without a kind at byte {place:,}")
-        yield place, kind[0]
-        (size,) = RECORD_SIZE.unpack(file.read(RECORD_SIZE.size))
-        file.seek(size, os.SEEK_CUR)
-
-
-def _chunk_places(path: Path) -> Iterator[int]:
-    with path.open("rb") as file:
-        file.readline()  # the version
-        for place, kind in _records(file):
-            if kind == OP_CHUNK:
-                yield place
-            elif kind not in (OP_BAG_HEADER, OP_INDEX, OP_CHUNK_INFO, OP_CONNECTION):
-                raise ValueError(f"a record outside its chunks (op {kind}) is in no index")
+    if hasattr(reader, "chunk_infos"):
+        return sum(sum(chunk.connection_counts.values()) for chunk in reader.chunk_infos)
+    databases = getattr(reader.storage, "storages", [reader.storage])
+    return sum(database.metadata.message_count for database in databases)
 
 
 def _each_chunk_once(read_chunk_info: Callable[[], Any]) -> Callable[[], Any]:
@@ -166,11 +78,12 @@ def _each_chunk_once(read_chunk_info: Callable[[], Any]) -> Callable[[], Any]:
     return read
 
 
-def _bounded(chunk: Any, messages: int) -> Any:
+def _bounded(chunk: Any) -> Any:
     """The same chunk of ROS 1, unpacked by derain."""
     by_name = ROSBAGS.load("bags", "rosbag1.reader").decompressors
     names = {function: name for name, function in by_name.items()}
-    return chunk._replace(decompressor=ChunkUnpacker(names[chunk.decompressor], messages))
+    unpacker = partial(unpack, compression=names[chunk.decompressor])
+    return chunk._replace(decompressor=unpacker)
 
 
 @contextmanager

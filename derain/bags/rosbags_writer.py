@@ -7,9 +7,7 @@ import yaml
 
 from derain.bags.bag import Bag, Message
 from derain.bags.ros2_metadata import NEWEST_VERSION, OLDER_VERSION
-from derain.bags.rosbags_reader import other_tables
 from derain.system.extras import LZ4, ROSBAGS
-from derain.system.notices import warn
 
 
 class RosbagsWriter:
@@ -100,7 +98,7 @@ class RosbagsWriter:
 def _ros1(reader: Any, path: Path) -> Any:
     """A writer of ROS 1 that compresses as the other bag does."""
     library = ROSBAGS.load(path, "rosbag1")
-    used = {chunk.decompressor.compression for chunk in reader.chunks.values()}
+    used = {chunk.decompressor.keywords["compression"] for chunk in reader.chunks.values()}
     writer = library.Writer(path)
     for format_ in library.Writer.CompressionFormat:
         if format_.name.lower() in used:
@@ -133,8 +131,6 @@ def _ros2(bag: Bag, reader: Any, path: Path) -> Any:
     if bag.metadata is not None and bag.metadata.compression:
         mode = library.CompressionMode[bag.metadata.compression.upper()]
         writer.set_compression(mode, library.CompressionFormat.ZSTD)
-    for table in other_tables(reader):
-        warn(f"{bag.path}: its table '{table}' is not one of ROS 2, and is not copied")
     for key, value in (reader.storage.metadata.custom or {}).items():
         writer.set_custom_data(str(key), str(value))
     return writer
