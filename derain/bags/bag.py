@@ -5,20 +5,25 @@ of these becomes one InputError.
 """
 
 import os
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from derain.bags.cloud_message import CDR, ROS1
-from derain.bags.names import ROS1_SUFFIX
+from derain.bags.names import MCAP_SUFFIX, ROS1_SUFFIX, files_of
 from derain.bags.ros2_metadata import FILE, MESSAGE, Ros2Metadata
 from derain.bags.rosbags_reader import MOST_TOPICS, rosbags_reader, stored_messages
 from derain.bags.topics import Topic, cloud_topic
 from derain.bags.unpacking import unpack, unpacked_bag
 from derain.errors import InputError, reason_of
+from derain.files.reading import file_size
 from derain.system.extras import MCAP
+
+# Suffix of a file → its storage; of any other, SQLite.
+STORAGES = {ROS1_SUFFIX: "ros1", MCAP_SUFFIX: "mcap"}
 
 
 class Message(NamedTuple):
@@ -50,11 +55,6 @@ class Bag:
         self.path = path
         self._unpacked: Path | None = None  # another process gets it by pickling
 
-    @property
-    def is_ros1(self) -> bool:
-        """True if ROS 1 recorded it."""
-        return self.path.suffix.lower() == ROS1_SUFFIX and not os.path.isdir(self.path)
-
     @cached_property
     def metadata(self) -> Ros2Metadata | None:
         """The metadata.yaml of a folder; None of a file.
@@ -74,9 +74,12 @@ class Bag:
         """
         if self.metadata is not None:
             return self.metadata.storage
-        if self.is_ros1:
-            return "ros1"
-        return "mcap" if self.path.suffix.lower() == ".mcap" else "sqlite3"
+        return STORAGES.get(self.path.suffix.lower(), "sqlite3")
+
+    @property
+    def is_ros1(self) -> bool:
+        """True if it is a file of ROS 1."""
+        return self.storage == "ros1"
 
     @cached_property
     def topics(self) -> tuple[Topic, ...]:
@@ -86,22 +89,24 @@ class Bag:
             InputError: A bag that cannot be read, or has names and numbers of messages that no
                 recording has.
         """
-        encoding = ROS1 if self.is_ros1 else CDR
-        found: dict[tuple[str, str], Topic] = {}
+        usual = ROS1 if self.is_ros1 else CDR
+        numbers = Counter[tuple[str, str, str]]()
         with self.opened() as reader:
             for connection in reader.connections:
-                name = (str(connection.topic), str(connection.msgtype))
-                if "\0" in name[0]:
-                    raise ValueError(f"the topic {name[0]} has a NUL in its name")
-                before = found[name].messages if name in found else 0
-                messages = before + max(int(connection.msgcount), 0)
-                written = str(connection.encoding) if self.storage == "mcap" else encoding
-                found[name] = Topic(*name, messages, written)
-            messages = sum(topic.messages for topic in found.values())
-            size = sum((self.path / name).stat().st_size for name in _names_of_files(self.metadata))
-            if messages > size:
-                raise ValueError(f"{messages:,} messages are stated in {size:,} bytes")
-        return tuple(topic for _, topic in sorted(found.items()))
+                name, encoding = str(connection.topic), usual
+                if "\0" in name:
+                    raise ValueError(f"the topic {name} has a NUL in its name")
+                if self.storage == "mcap":
+                    encoding = str(connection.encoding)
+                messages = max(int(connection.msgcount), 0)
+                numbers[name, str(connection.msgtype), encoding] += messages
+            size = sum(map(file_size, files_of(self.path)))
+            if numbers.total() > size:
+                raise ValueError(f"{numbers.total():,} messages are stated in {size:,} bytes")
+        return tuple(
+            Topic(name, kind, number, encoding)
+            for (name, kind, encoding), number in sorted(numbers.items())
+        )
 
     def cloud_topic(self, name: str = "") -> Topic:
         """The topic of point clouds of a name, or the only one.
@@ -122,13 +127,20 @@ class Bag:
             InputError: A library is not installed; or the bag cannot be read, also in the block.
         """
         with self.reading():
-            metadata = self.metadata
-            path = self.path
+            path, metadata = self.path, self.metadata
             if metadata is not None and metadata.compression == FILE:
                 if self._unpacked is None or not os.path.isdir(self._unpacked):
-                    self._unpacked = unpacked_bag(self.path, metadata)
+                    self._unpacked = unpacked_bag(path, metadata)
                 path, metadata = self._unpacked, metadata.unpacked()
-            with self._reader(path, metadata) as reader:
+            if self.storage == "mcap":
+                MCAP.load(self.path)
+                from derain.bags.mcap_reader import mcap_reader
+
+                names = [""] if metadata is None else metadata.files
+                lent = mcap_reader([path / name for name in names])
+            else:
+                lent = rosbags_reader(path, self.is_ros1)
+            with lent as reader:
                 if len(reader.connections) > MOST_TOPICS:
                     raise ValueError(f"it has more than {MOST_TOPICS:,} topics")
                 yield reader
@@ -145,14 +157,11 @@ class Bag:
         except (InputError, BrokenPipeError):
             raise
         except Exception as error:  # the libraries check little of what they read
-            reason = reason_of(error).rstrip(".")
             raise InputError(
                 self.path,
-                f"cannot be read as a bag ({reason})",
-                "Decrypt it by rosbag decrypt."
-                if "encrypt" in reason
-                else "It is damaged, cut off, encrypted or of another kind. A bag that was cut off "
-                f"may be repaired by {self._rescuer}",
+                f"cannot be read as a bag ({reason_of(error).rstrip('.')})",
+                "It is damaged, cut off, encrypted or of another kind. Try `rosbag reindex` or "
+                "`decrypt`, `mcap recover`, or SQLite's .recover.",
             ) from error
 
     def messages(self, topic: Topic | None = None, start: int | None = None) -> Iterator[Message]:
@@ -199,35 +208,10 @@ class Bag:
             if stored is not None and number != stored:
                 raise ValueError(f"its topics have {number:,} of {stored:,} messages")
 
-    def wrong_index(self, reason: str) -> InputError:
-        """The error of a bag whose index has more or fewer messages than the bag."""
+    def wrong_index(self, topic: Topic) -> InputError:
+        """The error of a bag with more or fewer messages of a topic than its index has."""
         return InputError(
-            self.path, reason, "Rebuild its index by `ros2 bag reindex` or `rosbag reindex`."
+            self.path,
+            f"has other messages of {topic.name} than the {topic.messages:,} of its index",
+            "Rebuild its index by `ros2 bag reindex` or `rosbag reindex`.",
         )
-
-    def too_few_clouds(self, topic: Topic) -> InputError:
-        """The error of a bag with fewer messages of a topic than its index has."""
-        return self.wrong_index(
-            f"has fewer messages of {topic.name} than the {topic.messages:,} of its index"
-        )
-
-    def _reader(self, path: Path, metadata: Ros2Metadata | None) -> Any:
-        if self.storage != "mcap":
-            return rosbags_reader(path, self.is_ros1)
-        MCAP.load(self.path)
-        from derain.bags.mcap_reader import mcap_reader
-
-        return mcap_reader([path / name for name in _names_of_files(metadata)])
-
-    @property
-    def _rescuer(self) -> str:
-        if self.is_ros1:
-            return "rosbag reindex."
-        names = os.listdir(self.path) if os.path.isdir(self.path) else [self.path.name]
-        is_mcap = any(name.lower().endswith(".mcap") for name in names)
-        return "mcap recover." if is_mcap else "sqlite3's .recover."
-
-
-def _names_of_files(metadata: Ros2Metadata | None) -> Sequence[str]:
-    """Names of the files of a bag, below its path; one that is a file has the empty name."""
-    return ("",) if metadata is None else metadata.files

@@ -58,7 +58,7 @@ class BagCopy:
                 if self._clouds > number:
                     return message
             self.write(message)
-        raise self.bag.too_few_clouds(self.topic)
+        raise self.bag.wrong_index(self.topic)
 
     def write(self, message: Message, data: bytes | None = None, topic: str | None = None) -> None:
         """Writes a message, or another one at its time.
@@ -88,13 +88,8 @@ class BagCopy:
         for message in self._messages:
             self._clouds += self.topic.has(message.connection)
             self.write(message)
-        if self._clouds < self.topic.messages:
-            raise self.bag.too_few_clouds(self.topic)
-        if self._clouds > self.topic.messages:
-            raise self.bag.wrong_index(
-                f"has {self._clouds:,} messages of {self.topic.name}, more than its index has, "
-                "so the last ones were not cleaned"
-            )
+        if self._clouds != self.topic.messages:
+            raise self.bag.wrong_index(self.topic)
         with self._writing():
             self._writer.close()
         self._stack.close()

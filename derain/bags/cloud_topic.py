@@ -58,7 +58,7 @@ class CloudTopic:
         self._last: tuple[int, Message] | None = None  # the cloud that they yielded last
         self._times: Ints | None = None
         # Why there are no clouds after those whose times are known.
-        self._end = self.bag.too_few_clouds(self.topic)
+        self._end = self.bag.wrong_index(self.topic)
         self._layouts: set[tuple[PointField, ...]] = set()
         self._first_of_stamp: dict[int, int] = {}
         self._warned_of_stamps = False
@@ -117,7 +117,7 @@ class CloudTopic:
         ahead, self._next = number - self._next, None  # until it went well
         message = next(islice(self._messages, ahead, None), None)
         if message is None:
-            raise self.bag.too_few_clouds(self.topic)
+            raise self.bag.wrong_index(self.topic)
         self._next = number + 1
         return message
 

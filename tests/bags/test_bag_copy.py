@@ -34,7 +34,7 @@ def stating(clouds: int) -> Callable[[Path], None]:
             "its topics have 11 of 12 messages",
         ),
         (lambda bag: change_metadata(bag, without_text), "its topics have 9 of 12 messages"),
-        (stating(2), "more than its index has"),
+        (stating(2), "than the 2 of its index"),
         (stating(4), "than the 4 of its index"),
     ],
 )
