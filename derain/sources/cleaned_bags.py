@@ -19,10 +19,9 @@ from derain.sources.bag_frame import BagFrame
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 
-# Names of topics in ROS 1 and ROS 2.
+# Names of topics that both ROS 1 and ROS 2 allow.
 # Source: http://wiki.ros.org/Names and https://design.ros2.org/articles/topic_and_service_names.html
-ROS1_NAME = re.compile(r"/?[A-Za-z]\w*(/\w+)*", re.ASCII)
-ROS2_NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
+TOPIC_NAME = re.compile(r"/?[A-Za-z]\w*(/[A-Za-z]\w*)*", re.ASCII)
 
 # Name of the column of probabilities, float32, in files and in clouds.
 RAIN_PROBABILITY = "rain_probability"
@@ -65,12 +64,6 @@ class CleanedBags:
     def __init__(
         self, out: Path, source: Iterable[Frame], options: BagOptions, probability: bool = False
     ) -> None:
-        if options.cleaned_topic and options.cleaned_topic == options.removed_topic:
-            raise InputError(
-                "--removed-topic",
-                f"{options.removed_topic} is --cleaned-topic too",
-                "Name another.",
-            )
         self.out = out
         self.options = options
         self.probability = probability
@@ -203,20 +196,22 @@ class CleanedBags:
             raise InputError(self.out, f"is inside {bag}", remedy)
         if os.path.lexists(target) and not is_bag(target):
             raise InputError(target, "exists, and is not a bag", remedy)
-        pattern = ROS1_NAME if clouds.bag.is_ros1 else ROS2_NAME
         names = {topic.name for topic in clouds.bag.topics}
         for option, name in (
             ("--cleaned-topic", self.options.cleaned_topic),
             ("--removed-topic", self.options.removed_topic),
         ):
-            if name is not None and not pattern.fullmatch(name):
+            if name is None:
+                continue
+            if not TOPIC_NAME.fullmatch(name):
                 raise InputError(
                     option,
                     f"{name!r} is not a name of a topic",
                     "Join words of letters, digits and _ by /, such as /points_clean.",
                 )
             if name in names:
-                raise InputError(option, f"{bag} has a topic {name} already", "Name another.")
+                raise InputError(option, f"{target} has a topic {name} already", "Name another.")
+            names.add(name)
 
 
 def _whole_topics(source: Iterable[Frame]) -> dict[CloudTopic, Path]:
