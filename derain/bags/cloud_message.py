@@ -16,7 +16,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from derain.bags.point_cloud import PointCloud, PointField
+from derain.bags.point_cloud import PointCloud
 from derain.bags.topics import POINT_CLOUD
 from derain.system.extras import ROSBAGS
 
@@ -67,17 +67,7 @@ class CloudMessage:
             content = read(memoryview(message), POINT_CLOUD)
         except ROSBAGS.load("bags", "serde").SerdeError as error:
             raise ValueError(str(error)) from error
-        cloud = PointCloud(
-            content.height,
-            content.width,
-            tuple(PointField(f.name, f.offset, f.datatype, f.count) for f in content.fields),
-            content.is_bigendian,
-            content.point_step,
-            content.row_step,
-            memoryview(content.data),
-            content.is_dense,
-        )
-        return cls(encoding, content, cloud, stamp)
+        return cls(encoding, content, PointCloud.of(content), stamp)
 
     def to_bytes(self) -> bytes:
         """The bytes of the message."""

@@ -83,6 +83,24 @@ class PointCloud:
     data: bytes | memoryview
     is_dense: bool
 
+    @classmethod
+    def of(cls, message: Any) -> Self:
+        """The cloud of a message, as rclpy or rosbags has it; its bytes are not copied.
+
+        Raises:
+            ValueError: A message that contradicts itself.
+        """
+        return cls(
+            message.height,
+            message.width,
+            tuple(PointField(f.name, f.offset, f.datatype, f.count) for f in message.fields),
+            message.is_bigendian,
+            message.point_step,
+            message.row_step,
+            memoryview(message.data),
+            message.is_dense,
+        )
+
     def __post_init__(self) -> None:
         check_columns(len(self.fields))
         names = [field.name for field in self.fields if field.name]

@@ -36,7 +36,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.bags.point_cloud import PointCloud, PointField, scan_of_cloud
+from derain.bags.point_cloud import PointCloud, scan_of_cloud
 from derain.errors import InputError
 from derain.export.runtime import Derainer, Judgement
 from derain.files import read_scan
@@ -61,24 +61,6 @@ DEFAULTS = {
 DIAGNOSTIC_PERIOD = 1.0
 
 
-def cloud_of(message: Any) -> PointCloud:
-    """The cloud of a PointCloud2, whose bytes are not copied.
-
-    Raises:
-        ValueError: A message that contradicts itself.
-    """
-    return PointCloud(
-        message.height,
-        message.width,
-        tuple(PointField(f.name, f.offset, f.datatype, f.count) for f in message.fields),
-        message.is_bigendian,
-        message.point_step,
-        message.row_step,
-        memoryview(message.data),
-        message.is_dense,
-    )
-
-
 def message_of(cloud: PointCloud, like: Any) -> Any:
     """A PointCloud2 of some of the points of another, with its header and its fields."""
     message = type(like)()
@@ -98,13 +80,13 @@ def cleaned(message: Any, rain: NDArray[np.bool_], organised: bool = False) -> A
     Raises:
         ValueError: Coordinates that can hold no NaN.
     """
-    cloud = cloud_of(message)
+    cloud = PointCloud.of(message)
     return message_of(cloud.blank(rain) if organised else cloud.take(~rain), message)
 
 
 def removed(message: Any, rain: NDArray[np.bool_]) -> Any:
     """A PointCloud2 of the rain alone."""
-    return message_of(cloud_of(message).take(rain), message)
+    return message_of(PointCloud.of(message).take(rain), message)
 
 
 def rain_to_remove(judgement: Judgement) -> NDArray[np.bool_]:
@@ -188,7 +170,7 @@ class RainRemover:
             ValueError: A message that contradicts itself.
         """
         began = perf_counter()
-        judgement = self.derainer.judge(scan_of_cloud(Path("cloud"), cloud_of(message)))
+        judgement = self.derainer.judge(scan_of_cloud(Path("cloud"), PointCloud.of(message)))
         self.tally.add(judgement, perf_counter() - began, self.alarm)
         return judgement
 

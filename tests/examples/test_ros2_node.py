@@ -39,8 +39,8 @@ def test_a_cloud_is_parted_into_what_stays_and_what_is_removed(ros2_node, share)
     rain = np.random.default_rng(1).random(200) < share
     cleaned, removed = ros2_node.cleaned(message, rain), ros2_node.removed(message, rain)
     for result, rows in ((cleaned, ~rain), (removed, rain)):
-        expected = ros2_node.cloud_of(message).take(rows)
-        assert vars(ros2_node.cloud_of(result)) == vars(expected)
+        expected = ros2_node.PointCloud.of(message).take(rows)
+        assert vars(ros2_node.PointCloud.of(result)) == vars(expected)
         assert isinstance(result.data, array.array)
         assert result.header is message.header
         assert result is not message
@@ -145,7 +145,7 @@ def test_a_cloud_of_no_points_goes_out_as_it_came_in(ros2_node) -> None:
     nothing.point_step = 0
     node.subscriptions["points"][1](nothing)
     (published,) = node.publishers["points/clean"][1]
-    assert vars(ros2_node.cloud_of(published)) == vars(ros2_node.cloud_of(nothing))
+    assert vars(ros2_node.PointCloud.of(published)) == vars(ros2_node.PointCloud.of(nothing))
     assert node.logger == []
 
 
