@@ -8,7 +8,6 @@ Source: the MCAP specification, version 0 (https://mcap.dev/spec).
 
 import heapq
 import os
-from array import array
 from collections import Counter, defaultdict
 from collections.abc import Collection, Container, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -17,7 +16,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, BinaryIO
 
-import numpy as np
 from mcap.opcode import Opcode
 from mcap.reader import FOOTER_SIZE
 from mcap.records import (
@@ -38,7 +36,6 @@ from mcap.records import (
 from mcap.stream_reader import StreamReader, get_chunk_data_stream
 
 from derain.bags.unpacking import check_size, unpack
-from derain.scan import Ints
 
 MAGIC = b"\x89MCAP0\r\n"
 
@@ -78,8 +75,7 @@ class McapFile:
 
     Attributes:
         profile: The header's name for the kind of recording, such as ``ros2``.
-        schemas: Its schemas by their numbers.
-        channels: Its channels by their numbers.
+        connections: Its channels by their numbers, without the counts of their messages.
         chunks: The index of its chunks, in the order of the file.
         statistics: Its numbers of records, and its times.
 
@@ -102,38 +98,21 @@ class McapFile:
         summary = defaultdict[type, list[Any]](list)
         for record in self._records(self._read(footer_at, Footer).summary_start or footer_at):
             summary[type(record)].append(record)
-        self.schemas: dict[int, Schema] = {each.id: each for each in summary[Schema]}
-        self.channels: dict[int, Channel] = {each.id: each for each in summary[Channel]}
-        self._attachments = {each.offset for each in summary[AttachmentIndex]}
-        self._metadata = {each.offset for each in summary[MetadataIndex]}
-        # A chunk that is named twice would be unpacked again and again.
+        schemas = {each.id: each for each in summary[Schema]}
+        self.connections = {
+            each.id: _connection(each, schemas.get(each.schema_id)) for each in summary[Channel]
+        }
+        # By their places, for what is named twice would be read again and again.
         chunks = {each.chunk_start_offset: each for each in summary[ChunkIndex]}
         self.chunks: list[ChunkIndex] = [chunks[offset] for offset in sorted(chunks)]
-        indexed = len(chunks), len(self._attachments), len(self._metadata)
-        if not summary[Statistics] or indexed != _stated(summary[Statistics][0]):
-            raise ValueError("its index is missing or not whole")
+        self._others = {each.offset: Attachment for each in summary[AttachmentIndex]}
+        self._others |= {each.offset: Metadata for each in summary[MetadataIndex]}
+        if not summary[Statistics]:
+            raise ValueError("it has no index")
         self.statistics: Statistics = summary[Statistics][0]
-
-    def connections(self) -> dict[int, McapConnection]:
-        """Its channels by their numbers, without the counts of their messages.
-
-        Raises:
-            ValueError: A channel of a type that is not defined.
-        """
-        found = {}
-        for number, channel in self.channels.items():
-            schema = self.schemas.get(channel.schema_id)
-            if schema is None and channel.schema_id:
-                raise ValueError(f"{channel.topic} has an undefined type")
-            name = "" if schema is None else schema.name
-            found[number] = McapConnection(
-                channel.topic,
-                _long_name(name),
-                channel.message_encoding,
-                tuple(channel.metadata.items()),
-                None if schema is None else (name, schema.encoding, bytes(schema.data)),
-            )
-        return found
+        others = self.statistics.attachment_count + self.statistics.metadata_count
+        if len(chunks) != self.statistics.chunk_count or len(self._others) != others:
+            raise ValueError("its index is not whole")
 
     def messages(self, channels: Container[int], start: int = 0) -> Iterator[Message]:
         """Messages in the order of their times; of one time, in the order of the file.
@@ -162,10 +141,8 @@ class McapFile:
         Raises:
             ValueError: The index names a place that has none.
         """
-        for offset in sorted(self._attachments):
-            yield self._read(offset, Attachment)
-        for offset in sorted(self._metadata):
-            yield self._read(offset, Metadata)
+        for offset, kind in self._others.items():
+            yield self._read(offset, kind)
 
     def _records(self, offset: int) -> Iterator[Any]:
         """Records from a place on; chunks are not unpacked."""
@@ -213,59 +190,49 @@ class McapFile:
         self, channels: Container[int], start: int
     ) -> Iterator[tuple[int, Message | None]]:
         """Time and message of a file without chunks."""
-        times, offsets = self._places
-        for place in np.argsort(times, kind="stable"):
-            if times[place] >= start:
-                message = self._read(int(offsets[place]), Message)
+        for time, offset in self._places:
+            if time >= start:
+                message = self._read(offset, Message)
                 if message.channel_id in channels:
-                    yield message.log_time, message
+                    yield time, message
 
     @cached_property
-    def _places(self) -> tuple[Ints, Ints]:
+    def _places(self) -> list[tuple[int, int]]:
         """Time and offset of each message of a file without chunks, which has no index of them."""
-        times, offsets = array("Q"), array("Q")
+        found = []
         for record in self._records(len(MAGIC)):
             if isinstance(record, Message):
-                times.append(record.log_time)
-                offsets.append(self._file.tell() - len(record.data) - MESSAGE_HEAD)
+                found.append((record.log_time, self._file.tell() - len(record.data) - MESSAGE_HEAD))
             elif isinstance(record, DataEnd):
                 break
-        return np.asarray(times), np.asarray(offsets)
+        return sorted(found)
 
 
-@dataclass(frozen=True, eq=False)
 class McapReader:
     """The files of a bag in MCAP.
 
-    Attributes:
+    Args:
         files: The files, open, in the order of time.
+
+    Attributes:
+        connections: Its connections, in the order of the files.
+        message_count: Number of messages.
+        start_time: Time of recording of the first message, nanoseconds; 0 where there is none.
+        duration: Nanoseconds from the first to the last message.
     """
 
-    files: Sequence[McapFile]
-
-    @property
-    def connections(self) -> list[McapConnection]:
-        """Its connections, in the order of the files."""
+    def __init__(self, files: Sequence[McapFile]) -> None:
+        self.files = files
         counts = Counter[McapConnection]()
-        for file in self.files:
-            for number, connection in file.connections().items():
+        for file in files:
+            for number, connection in file.connections.items():
                 counts[connection] += file.statistics.channel_message_counts.get(number, 0)
-        return [replace(each, msgcount=count) for each, count in counts.items()]
-
-    @property
-    def message_count(self) -> int:
-        """Number of messages."""
-        return sum(file.statistics.message_count for file in self.files)
-
-    @property
-    def start_time(self) -> int:
-        """Time at which the first message was recorded, nanoseconds; 0 where there is none."""
-        return min((each.message_start_time for each in self._filled), default=0)
-
-    @property
-    def duration(self) -> int:
-        """Nanoseconds from the first to the last message."""
-        return max((each.message_end_time for each in self._filled), default=0) - self.start_time
+        self.connections = [replace(each, msgcount=count) for each, count in counts.items()]
+        filled = [file.statistics for file in files if file.statistics.message_count]
+        self.message_count: int = sum(each.message_count for each in filled)
+        self.start_time: int = min((each.message_start_time for each in filled), default=0)
+        end = max((each.message_end_time for each in filled), default=0)
+        self.duration: int = end - self.start_time
 
     def messages(
         self, connections: Collection[McapConnection], start: int | None = None
@@ -285,7 +252,7 @@ class McapReader:
         """
         wanted = set(connections)
         for file in self.files:
-            channels = {n: each for n, each in file.connections().items() if each in wanted}
+            channels = {n: each for n, each in file.connections.items() if each in wanted}
             for found in file.messages(channels, start or 0):
                 connection = channels[found.channel_id]
                 yield connection, found.log_time, found.data, found.publish_time, found.sequence
@@ -294,11 +261,6 @@ class McapReader:
         """Those of all files; see :meth:`McapFile.attachments_and_metadata`."""
         for file in self.files:
             yield from file.attachments_and_metadata()
-
-    @property
-    def _filled(self) -> list[Statistics]:
-        """Statistics of the files with messages."""
-        return [file.statistics for file in self.files if file.statistics.message_count]
 
 
 @contextmanager
@@ -317,9 +279,22 @@ def mcap_reader(paths: Sequence[Path]) -> Iterator[McapReader]:
         yield McapReader([McapFile(file) for file in opened])
 
 
-def _stated(statistics: Statistics) -> tuple[int, int, int]:
-    """Numbers of chunks, attachments and records of metadata."""
-    return statistics.chunk_count, statistics.attachment_count, statistics.metadata_count
+def _connection(channel: Channel, schema: Schema | None) -> McapConnection:
+    """The connection of a channel.
+
+    Raises:
+        ValueError: A channel of a type that is not defined.
+    """
+    if schema is None and channel.schema_id:
+        raise ValueError(f"{channel.topic} has an undefined type")
+    name = "" if schema is None else schema.name
+    return McapConnection(
+        channel.topic,
+        _long_name(name),
+        channel.message_encoding,
+        tuple(channel.metadata.items()),
+        None if schema is None else (name, schema.encoding, bytes(schema.data)),
+    )
 
 
 def _may_hold(index: ChunkIndex, channels: Container[int]) -> bool:
