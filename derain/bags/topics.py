@@ -68,22 +68,23 @@ def cloud_topic(bag: Path, topics: Sequence[Topic], name: str = "") -> Topic:
     Raises:
         InputError: No such topic, one of another type, none at all, or several.
     """
-    clouds = [topic for topic in topics if topic.type == POINT_CLOUD]
-    if name:
-        return _named(bag, topics, clouds, name)
-    filled = [topic for topic in clouds if topic.messages]
-    if len(filled) == 1:
-        return filled[0]
-    if filled:
+    wanted = name.strip("/")
+    named = [topic for topic in topics if not name or topic.name.strip("/") == wanted]
+    clouds = [topic for topic in named if topic.type == POINT_CLOUD and (name or topic.messages)]
+    if len(clouds) == 1:
+        return clouds[0]
+    if clouds:
         raise InputError(
             bag,
-            f"has {len(filled)} topics of point clouds: {_listed(filled)}",
-            f"Name one with --topic, or as {bag}{filled[0].name}.",
+            f"has {len(clouds)} topics of point clouds: {_listed(clouds)}",
+            f"Name one with --topic, or as {bag}{clouds[0].name}.",
         )
+    if topics and not named:
+        raise InputError(bag, f"has no topic {name}", f"Its topics: {_listed(topics)}.")
     raise InputError(
         bag,
-        f"holds no point clouds ({POINT_CLOUD}), but {_listed(topics)}",
-        _remedy_without_clouds(topics),
+        f"holds no point clouds ({POINT_CLOUD}), but {_listed(named)}",
+        _remedy_without_clouds(named),
     )
 
 
@@ -94,20 +95,6 @@ def decoder_of(message_type: str) -> str | None:
         message_type: Its type, such as ``velodyne_msgs/msg/VelodyneScan``.
     """
     return PACKET_DECODERS.get(message_type.replace("/msg/", "/"))
-
-
-def _named(bag: Path, topics: Sequence[Topic], clouds: Sequence[Topic], name: str) -> Topic:
-    same = [topic for topic in topics if topic.name.strip("/") == name.strip("/")]
-    for topic in same:
-        if topic in clouds:
-            return topic
-    if same:
-        raise InputError(
-            bag,
-            f"{same[0].name} is {same[0].type}, not {POINT_CLOUD}",
-            _remedy_without_clouds(same),
-        )
-    raise InputError(bag, f"has no topic {name}", f"Its topics of point clouds: {_listed(clouds)}.")
 
 
 def _listed(topics: Iterable[Topic]) -> str:

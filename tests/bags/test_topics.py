@@ -30,7 +30,7 @@ def test_the_topic_is_the_named_one_or_the_only_one(topics, name, chosen) -> Non
     ("topics", "name", "words"),
     [
         ([FRONT, REAR], "", ["/front/points", "/rear/points", "--topic"]),
-        ([FRONT, IMU], "imu/data", ["/imu/data is sensor_msgs/msg/Imu"]),
+        ([FRONT, IMU], "imu/data", ["no point clouds", "/imu/data (sensor_msgs/msg/Imu, 1,000)"]),
         ([FRONT, IMU], "points", ["no topic points", "/front/points"]),
         ([IMU], "", ["no point clouds", "/imu/data (sensor_msgs/msg/Imu, 1,000)"]),
         ([], "", ["no point clouds"]),
