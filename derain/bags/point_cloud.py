@@ -112,20 +112,16 @@ class PointCloud:
                 raise ValueError(
                     f"field '{field.name}' ends at byte {end:,} of points of {self.point_step:,}"
                 )
-        points = self.height * self.width  # more than a length may be, before the checks
-        if not points:
+        if not self.height * self.width:  # may be more than a length before the checks
             return
-        if self.point_step == 0:
-            raise ValueError(f"{points:,} points of no bytes")
-        if self.height > 1 and self.row_step < self.width * self.point_step:
+        if (
+            not self.point_step
+            or (self.is_organised and self.row_step < self.width * self.point_step)
+            or len(self.data) < self.height * self._step_of_rows
+        ):
             raise ValueError(
-                f"rows of {self.row_step:,} bytes hold no {self.width:,} points of "
-                f"{self.point_step:,}"
-            )
-        if len(self.data) < self.height * self._step_of_rows:
-            raise ValueError(
-                f"{len(self.data):,} bytes where {self.height:,} rows of "
-                f"{self._step_of_rows:,} are announced"
+                f"{len(self.data):,} bytes hold no {self.height:,} x {self.width:,} points of "
+                f"{self.point_step:,} in rows of {self._step_of_rows:,}"
             )
 
     def __len__(self) -> int:

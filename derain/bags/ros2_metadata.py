@@ -1,8 +1,7 @@
 """The metadata.yaml of a bag of ROS 2: which files it has, and how they are compressed."""
 
 import os
-from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -20,21 +19,6 @@ STORAGES = ("sqlite3", "mcap")
 
 # Modes of compression: none, of each message, of each file.
 NONE, MESSAGE, FILE = "", "message", "file"
-
-
-def small_yaml(text: str) -> Any:
-    """Parses a YAML text of a bag.
-
-    Args:
-        text: The text.
-
-    Raises:
-        ValueError: No YAML, or more than a bag needs.
-    """
-    try:
-        return parsed_yaml(text, aliases=True)
-    except Exception as error:  # PyYAML has many
-        raise ValueError(f"no YAML that can be used ({reason_of(error)})") from error
 
 
 @dataclass(frozen=True)
@@ -65,8 +49,9 @@ class Ros2Metadata:
             OSError: It cannot be read.
         """
         with (folder / BAG_METADATA).open("rb") as file:
-            document = small_yaml(file.read(LARGEST_DOCUMENT + 1).decode("utf-8"))
+            text = file.read(LARGEST_DOCUMENT + 1).decode("utf-8")
         try:
+            document = parsed_yaml(text, aliases=True)
             content = document[METADATA_WORD.decode()]
             version, storage = int(content["version"]), str(content["storage_identifier"])
             files = tuple(PurePath(name).name for name in content["relative_file_paths"])
@@ -74,8 +59,8 @@ class Ros2Metadata:
             packing = str(content.get("compression_format") or "")
             for topic in content["topics_with_message_count"]:
                 int(topic["message_count"]), topic["topic_metadata"]["name"]
-        except (LookupError, TypeError, AttributeError) as error:
-            raise ValueError(f"its {BAG_METADATA} is damaged: {error!r}") from error
+        except Exception as error:  # PyYAML has many
+            raise ValueError(f"its {BAG_METADATA} is damaged: {reason_of(error)}") from error
         if version > NEWEST_VERSION:
             raise ValueError(f"version {version} of {BAG_METADATA} is not known")
         if storage not in STORAGES:
@@ -89,13 +74,13 @@ class Ros2Metadata:
 
     def unpacked(self) -> "Ros2Metadata":
         """The metadata of the same bag after its files are unpacked."""
-        files = [PurePath(name).stem for name in self.files]
-        content = deepcopy(self.content) | {
-            "relative_file_paths": files,
+        files = tuple(PurePath(name).stem for name in self.files)
+        content = self.content | {
+            "relative_file_paths": list(files),
             "compression_mode": NONE,
             "compression_format": "",
         }
-        return Ros2Metadata(content, self.version, self.storage, tuple(files), NONE)
+        return replace(self, content=content, files=files, compression=NONE)
 
     def write(self, folder: Path) -> None:
         """Writes it to a folder."""

@@ -109,11 +109,14 @@ def test_no_points_are_an_empty_scan_whatever_the_fields(fields, height) -> None
         ((1, 2, (*X, *X), False, 4, 8, bytes(8), True), "comes twice"),
         ((1, 2, (PointField("x", 2, 7, 1),), False, 4, 8, bytes(8), True), "ends at byte 6"),
         ((1, 2, (PointField("x", 0, 9, 1),), False, 4, 8, bytes(8), True), "datatype 9"),
-        ((1, 3, X, False, 4, 12, bytes(11), True), "11 bytes where 1 rows of 12"),
-        ((2, 3, X, False, 4, 11, bytes(24), True), "rows of 11 bytes"),
-        ((1, 3, (), False, 0, 0, b"", True), "points of no bytes"),
-        ((2**31, 2**31, X, False, 4, 2**32 - 1, b"", True), "rows of"),
-        ((2**32 - 1, 2**32 - 1, X, False, 4, 16, b"", True), "rows of"),
+        (
+            (1, 3, X, False, 4, 12, bytes(11), True),
+            "11 bytes hold no 1 x 3 points",
+        ),
+        ((2, 3, X, False, 4, 11, bytes(24), True), "in rows of 11"),
+        ((1, 3, (), False, 0, 0, b"", True), "points of 0"),
+        ((2**31, 2**31, X, False, 4, 2**32 - 1, b"", True), "in rows of"),
+        ((2**32 - 1, 2**32 - 1, X, False, 4, 16, b"", True), "in rows of"),
     ],
 )
 def test_contradictions_are_refused(arguments, reason) -> None:
