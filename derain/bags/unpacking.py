@@ -100,16 +100,15 @@ def unpacked_bag(folder: Path, metadata: Ros2Metadata) -> Path:
 
 
 def _unpack_file(source: Path, target: Path) -> None:
-    zstandard = ZSTANDARD.load(source)
-    with source.open("rb") as packed, target.open("xb") as unpacked:
-        try:
-            with zstandard.ZstdDecompressor().stream_reader(packed) as reader:
-                while portion := reader.read(PORTION):
-                    if shutil.disk_usage(target.parent).free < LEFT + len(portion):
-                        raise ValueError(
-                            f"{source.name} unpacks to more than the free space in "
-                            f"{target.parent.parent}"
-                        )
-                    unpacked.write(portion)
-        except zstandard.ZstdError as error:
-            raise ValueError(f"{source.name} is damaged: {error}") from error
+    unpacker = ZSTANDARD.load(source).ZstdDecompressor()
+    with (
+        source.open("rb") as packed,
+        unpacker.stream_reader(packed) as reader,
+        target.open("xb") as unpacked,
+    ):
+        while portion := reader.read(PORTION):
+            if shutil.disk_usage(target.parent).free < LEFT + len(portion):
+                raise ValueError(
+                    f"{source.name} unpacks to more than the free space in {target.parent.parent}"
+                )
+            unpacked.write(portion)
