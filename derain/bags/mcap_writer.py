@@ -37,19 +37,16 @@ class McapWriter:
             path.mkdir()
             path = path / f"{path.name}.mcap"
         self._file = path.open("xb")
-        used = {chunk.compression for file in bag.files for chunk in file.chunks}
-        if metadata is not None and metadata.compression:
-            used = {"zstd"}
-        kinds = [kind for kind in CompressionType if kind.name.lower() in used]
-        self._writer: Any = Writer(
-            self._file, compression=kinds[0] if kinds else CompressionType.NONE
-        )
+        chunks = (chunk.compression for each in bag.files for chunk in each.chunks)
+        is_packed = metadata is not None and metadata.compression
+        compression = "zstd" if is_packed else next(chunks, "")
+        kind = CompressionType[compression.upper() or "NONE"]
+        self._writer: Any = Writer(self._file, compression=kind)
         self._writer.start(bag.files[0].profile)
         self._schemas: dict[object, int] = {None: 0}
         self._channels: dict[McapConnection, int] = {}
         self._counts = Counter[str]()
-        # Name of each topic → of the topic of the other bag that it is like.
-        self._like: dict[str, str] = {}
+        self._topics: dict[str, dict[str, Any]] = {}
 
     def connection(self, like: McapConnection, topic: str | None = None) -> McapConnection:
         """A connection of this bag; see :meth:`RosbagsWriter.connection`."""
@@ -60,7 +57,8 @@ class McapWriter:
             self._channels[new] = self._writer.register_channel(
                 new.topic, new.encoding, self._schemas[new.schema], dict(new.notes)
             )
-            self._like[new.topic] = like.topic
+            if self.metadata is not None:
+                self._topics[new.topic] = self.metadata.topic(like.topic) | {"name": new.topic}
         return new
 
     def write(self, connection: McapConnection, like: Any, data: bytes) -> None:
@@ -89,26 +87,18 @@ class McapWriter:
 
     def _written_metadata(self, old: Ros2Metadata) -> Ros2Metadata:
         """The metadata of this bag: that of the other, with what differs."""
-        name = Path(self._file.name).name
-        topics = old.content["topics_with_message_count"]
-        known = {each["topic_metadata"]["name"]: each["topic_metadata"] for each in topics}
+        file = Path(self._file.name).name
         span = {key: old.content[key] for key in ("starting_time", "duration")}
         count = {"message_count": self._counts.total()}
-        content = (
-            old.content
-            | count
-            | {
-                "compression_format": "",
-                "compression_mode": NONE,
-                "topics_with_message_count": [
-                    {
-                        "topic_metadata": known[like] | {"name": topic},
-                        "message_count": self._counts[topic],
-                    }
-                    for topic, like in self._like.items()
-                ],
-                "relative_file_paths": [name],
-                "files": [{"path": name, **deepcopy(span), **count}],
-            }
-        )
-        return replace(old, content=content, files=(name,), compression=NONE)
+        content = old.content | {
+            **count,
+            "compression_format": "",
+            "compression_mode": NONE,
+            "topics_with_message_count": [
+                {"topic_metadata": topic, "message_count": self._counts[name]}
+                for name, topic in self._topics.items()
+            ],
+            "relative_file_paths": [file],
+            "files": [{"path": file, **deepcopy(span), **count}],
+        }
+        return replace(old, content=content, files=(file,), compression=NONE)

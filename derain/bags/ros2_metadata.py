@@ -82,6 +82,17 @@ class Ros2Metadata:
         }
         return replace(self, content=content, files=files, compression=NONE)
 
+    def topic(self, name: str) -> dict[str, Any]:
+        """The metadata of a topic.
+
+        Raises:
+            ValueError: There are none.
+        """
+        for each in self.content["topics_with_message_count"]:
+            if each["topic_metadata"]["name"] == name:
+                return dict(each["topic_metadata"])
+        raise ValueError(f"its {BAG_METADATA} lacks the topic {name}")
+
     def write(self, folder: Path) -> None:
         """Writes it to a folder."""
         text = yaml.safe_dump({METADATA_WORD.decode(): self.content}, sort_keys=False)

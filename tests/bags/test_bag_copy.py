@@ -47,6 +47,13 @@ def test_a_database_with_other_messages_than_its_index_is_not_copied(
         copied(bag, tmp_path / "out")
 
 
+def test_a_topic_that_the_metadata_lack_is_named(tmp_path) -> None:
+    bag = small_bag(tmp_path, "mcap")
+    change_metadata(bag, without_text)
+    with pytest.raises(InputError, match=f"metadata.yaml lacks the topic {TEXT}"):
+        copied(bag, tmp_path / "out")
+
+
 def of_no_topic(content: bytes) -> bytes:
     """The index of the first chunk's first topic becomes that of a topic that there is not."""
     place = re.search(rb"op=\x04.{16}conn=", content, re.DOTALL).end()
