@@ -7,7 +7,7 @@ of these becomes one InputError.
 import os
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -145,24 +145,18 @@ class Bag:
                     raise ValueError(f"it has more than {MOST_TOPICS:,} topics")
                 yield reader
 
-    @contextmanager
-    def reading(self) -> Iterator[None]:
+    def reading(self) -> AbstractContextManager[None]:
         """Turns the errors of reading the bag into an InputError.
 
         Raises:
             InputError: An exception of the block.
         """
-        try:
-            yield
-        except (InputError, BrokenPipeError):
-            raise
-        except Exception as error:  # the libraries check little of what they read
-            raise InputError(
-                self.path,
-                f"cannot be read as a bag ({reason_of(error).rstrip('.')})",
-                "It is damaged, cut off, encrypted or of another kind. Try `rosbag reindex` or "
-                "`decrypt`, `mcap recover`, or SQLite's .recover.",
-            ) from error
+        return library_errors(
+            self.path,
+            "cannot be read as a bag",
+            "It is damaged, cut off, encrypted or of another kind. Try `rosbag reindex` or "
+            "`decrypt`, `mcap recover`, or SQLite's .recover.",
+        )
 
     def messages(self, topic: Topic | None = None, start: int | None = None) -> Iterator[Message]:
         """Its messages in the order of time, read one at a time.
@@ -215,3 +209,23 @@ class Bag:
             f"has other messages of {topic.name} than the {topic.messages:,} of its index",
             "Rebuild its index by `ros2 bag reindex` or `rosbag reindex`.",
         )
+
+
+@contextmanager
+def library_errors(bag: Path, what: str, remedy: str) -> Iterator[None]:
+    """Turns any error of a block into an InputError: the libraries check little of what they read.
+
+    Args:
+        bag: Path of the bag.
+        what: What failed.
+        remedy: What to do.
+
+    Raises:
+        InputError: An exception of the block.
+    """
+    try:
+        yield
+    except (InputError, BrokenPipeError):
+        raise
+    except Exception as error:
+        raise InputError(bag, f"{what} ({reason_of(error).rstrip('.')})", remedy) from error

@@ -1,15 +1,13 @@
 """Copies a bag message by message, with other clouds in one of its topics."""
 
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 from typing import Any, Self
 
-from derain.bags.bag import Bag, Message
+from derain.bags.bag import Bag, Message, library_errors
 from derain.bags.names import written_name
 from derain.bags.rosbags_writer import RosbagsWriter
 from derain.bags.topics import Topic
-from derain.errors import InputError, reason_of
 
 
 class BagCopy:
@@ -103,19 +101,13 @@ class BagCopy:
             self._writer.abort()  # does nothing to a finished copy
         self._stack.close()
 
-    @contextmanager
-    def _writing(self) -> Iterator[None]:
+    def _writing(self) -> AbstractContextManager[None]:
         """Turns the errors of writing the copy into an InputError."""
-        try:
-            yield
-        except (InputError, BrokenPipeError):
-            raise
-        except Exception as error:  # of the libraries
-            raise InputError(
-                self.bag.path,
-                f"its copy cannot be written ({reason_of(error)})",
-                "Choose a folder that is writable and has room; repair a bag that is damaged.",
-            ) from error
+        return library_errors(
+            self.bag.path,
+            "its copy cannot be written",
+            "Choose a folder that is writable and has room; repair a bag that is damaged.",
+        )
 
 
 def _writer(bag: Bag, reader: Any, path: Path) -> Any:
