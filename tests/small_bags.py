@@ -12,6 +12,7 @@ import yaml
 from benchmarks.recorded_bags import Recorded, Ros, Storage, drive, table_of, write_bag
 from derain.bags.bag import Bag
 from derain.bags.bag_copy import BagCopy
+from derain.bags.names import written_name
 from derain.evaluation.hard_cases import scene
 from derain.scan import Array
 
@@ -54,7 +55,8 @@ def copied(path: Path, out: Path) -> Path:
     """A copy of a bag in a folder that is made."""
     bag = Bag(path)
     out.mkdir()
-    with BagCopy(bag, bag.cloud_topic(), out) as copy:
+    name = written_name(path, path.is_file())
+    with BagCopy(bag, bag.cloud_topic(), out / name) as copy:
         return copy.finish()
 
 

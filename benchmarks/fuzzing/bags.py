@@ -41,6 +41,7 @@ from benchmarks.recorded_bags import (
     write_bag,
 )
 from derain.bags.bag_copy import BagCopy
+from derain.bags.names import written_name
 from derain.evaluation.hard_cases import scene
 from derain.sources.bag_frame import clouds_at
 from derain.sources.folders import named_frames
@@ -83,7 +84,8 @@ def _read_bag(path: Path) -> None:
         assert scan.xyz.shape == (len(scan), 3), scan.xyz.shape
     clouds, _ = clouds_at(path)
     with tempfile.TemporaryDirectory() as folder:
-        with BagCopy(clouds.bag, clouds.topic, Path(folder)) as copy:
+        target = Path(folder, written_name(clouds.bag.path, clouds.bag.path.is_file()))
+        with BagCopy(clouds.bag, clouds.topic, target) as copy:
             made = copy.finish()
         assert len(named_frames([made])) == len(frames)
 

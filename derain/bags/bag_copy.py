@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any, Self
 
 from derain.bags.bag import Bag, Message, library_errors
-from derain.bags.names import written_name
 from derain.bags.rosbags_writer import RosbagsWriter
 from derain.bags.topics import Topic
 
@@ -19,22 +18,23 @@ class BagCopy:
     Args:
         bag: The bag.
         topic: Its topic of clouds.
-        folder: Path of the copy; the caller removes an incomplete one.
+        path: Path of the copy, whose name is that of :func:`derain.bags.names.written_name`; the
+            caller removes an incomplete one.
 
     Raises:
         InputError: A bag that cannot be read, or a copy that cannot be written.
     """
 
-    def __init__(self, bag: Bag, topic: Topic, folder: Path) -> None:
+    def __init__(self, bag: Bag, topic: Topic, path: Path) -> None:
         self.bag = bag
         self.topic = topic
         self._stack = ExitStack()
         reader = self._stack.enter_context(bag.opened())
         self._messages = bag.messages_of(reader)
         self._clouds = 0
-        self.path = folder / written_name(bag.path, bag.metadata is None)
+        self.path = path
         with self._writing():
-            self._writer = _writer(bag, reader, self.path)
+            self._writer = _writer(bag, reader, path)
             for connection in reader.connections:  # as many, and in the same order
                 self._writer.connection(connection)
 

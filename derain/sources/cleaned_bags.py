@@ -167,8 +167,8 @@ class CleanedBags:
             self._finish()
             with writing(self.out):
                 folder = self._stack.enter_context(temporary_folder(self.out))
-            copy = self._stack.enter_context(BagCopy(clouds.bag, clouds.topic, folder))
-            self._current = clouds, copy
+            copy = BagCopy(clouds.bag, clouds.topic, folder / self._targets[clouds].name)
+            self._current = clouds, self._stack.enter_context(copy)
         return self._current[1]
 
     def _finish(self) -> None:
