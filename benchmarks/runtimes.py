@@ -13,10 +13,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
+import torch
+from torch import Tensor
 from turns import milliseconds_in_turns
 
 from derain.errors import InputError
-from derain.export.proof import compare_runtimes
+from derain.export.proof import FINITE, prove
 from derain.export.runtime import Derainer
 from derain.export.runtimes.session import DEFAULT_RUNTIME
 from derain.export.timing import versions
@@ -54,8 +56,14 @@ def main() -> None:
     networks = {name: _network(derainer, [view]) for name, derainer in derainers.items()}
     print(f"{arguments.model.name}: {view.size:,} points or pixels, {arguments.threads} threads")
     _report(milliseconds_in_turns(networks, arguments.rounds, runs=3), DEFAULT_RUNTIME)
+
+    def by_usual(**tensors: Tensor) -> Tensor:
+        inputs = {title: tensor.numpy() for title, tensor in tensors.items()}
+        return torch.from_numpy(usual.session.run(inputs))
+
     for name, derainer in derainers.items():
-        found = compare_runtimes(usual, derainer, [(scan.name, scan)])
+        scans = [(scan.name, scan)]
+        found = prove(by_usual, arguments.model, scans, FINITE, derainer.runtime)
         print(
             f"  {name:20} largest logit difference {found.worst.difference:.1e}, {found.flipped} "
             f"labels flipped, IoU of the rain {found.rain_iou:.4f}"

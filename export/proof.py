@@ -1,6 +1,6 @@
 """Proves an exported model against the network it was exported from."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from itertools import chain
 from pathlib import Path
@@ -199,39 +199,14 @@ def prove(
         bounds: Permitted differences.
         runtime: Runtime of the exported model.
     """
-
-    def expect(view: ViewedScan) -> Float32s:
-        tensors = {title: torch.from_numpy(array) for title, array in view.inputs().items()}
-        with torch.inference_mode():
-            return forward(**tensors).numpy()
-
     derainers = [Derainer(model, count, runtime.name, runtime.precision) for count in THREADS]
-    return _proof(expect, derainers, scans, bounds)
 
-
-def compare_runtimes(
-    reference: Derainer, derainer: Derainer, scans: Iterable[tuple[str, Scan]]
-) -> Proof:
-    """Runs one exported model by two runtimes on the same scans; they may differ as they like.
-
-    Args:
-        reference: The model by the runtime that the other is compared with.
-        derainer: The model by the other.
-        scans: Names and scans.
-    """
-    return _proof(reference.logits, [derainer], scans, FINITE)
-
-
-def _proof(
-    expect: Callable[[ViewedScan], Float32s],
-    derainers: Sequence[Derainer],
-    scans: Iterable[tuple[str, Scan]],
-    bounds: Bounds,
-) -> Proof:
     def compared(named: tuple[str, Scan]) -> list[Case]:
         name, scan = named
         view = derainers[0].view(scan)
-        expected = expect(view)
+        tensors = {title: torch.from_numpy(array) for title, array in view.inputs().items()}
+        with torch.inference_mode():
+            expected = forward(**tensors).numpy()
         # Cells with a return are those that would be rain if every point of the scan were.
         returned = view.target(np.ones(len(scan), bool)) == 1
         return [_case(name, view, returned, expected, derainer, bounds) for derainer in derainers]

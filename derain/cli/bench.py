@@ -17,8 +17,7 @@ Writes a table (bench.md, bench.csv, bench.json) and a plot of error against tim
 
 A method is a model (.onnx), parameters from `derain tune` (.yaml), default or a filter (below), or
 a baseline: position and intensity, learnt from the training scans, all and none.
-With --runtime, each model has a second row for that runtime, and derain prints how it differs from
-onnxruntime.
+With --runtime, each model has a second row for that runtime.
 Scoring runs all methods in one process, where filters share one neighbour search, or unit by unit
 in processes (--workers), shards or a Dask cluster, with the same figures. For more than --block
 scans derain keeps records in --out: a bench that was stopped resumes, and `derain status` prints

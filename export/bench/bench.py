@@ -13,7 +13,7 @@ from tqdm import tqdm
 
 from derain.cards.card import DataCard, load_card
 from derain.cards.rain_found import warn_without_rain
-from derain.errors import counted, reason_of
+from derain.errors import counted
 from derain.evaluation.scores import ScoredMethod, Scores, score
 from derain.export.bench.bench_entries import BenchEntry, GivenMethod, bench_entries
 from derain.export.bench.cost import Effort, measure_cost
@@ -22,11 +22,9 @@ from derain.export.bench.report import (
     draw_speed_error,
     failures_of,
     main_table,
-    runtimes_table,
     write_report,
 )
 from derain.export.bench.rows import Row, bench_rows
-from derain.export.runtime import Derainer
 from derain.export.runtimes.session import DEFAULT_RUNTIME, FLOAT32_PRECISION, Runtime
 from derain.export.timing import processor, versions
 from derain.files import DEFAULT_COLUMNS
@@ -49,7 +47,7 @@ from derain.views.scan_issues import ScanIssue
 
 @dataclass(frozen=True)
 class Bench:
-    """The results of a bench; as text: its main table, what other runtimes change, and what failed.
+    """The results of a bench; as text: its main table, and what failed.
 
     Attributes:
         rows: The results of each method, in the order of the methods.
@@ -61,13 +59,7 @@ class Bench:
     facts: Mapping[str, Any]
 
     def __str__(self) -> str:
-        changed = self.facts["runtimes"]
-        parts = [
-            main_table(self.rows),
-            runtimes_table(changed) if changed else "",
-            failures_of(self.rows),
-        ]
-        return "\n\n".join(filter(None, parts))
+        return "\n\n".join(filter(None, [main_table(self.rows), failures_of(self.rows)]))
 
     def __getitem__(self, title: str) -> Row:
         """The row of a method, by its title.
@@ -144,8 +136,7 @@ def bench(
         timed: Scans that each method is timed on, spread evenly.
         repeats: Timed runs on each of them.
         seed: Random seed of the bootstrap intervals.
-        runtime: Another runtime for every model besides onnxruntime, such as ``openvino``; the
-            results state what it changes.
+        runtime: Another runtime for every model besides onnxruntime, such as ``openvino``.
         precision: Of that runtime: ``float32``, or ``bf16`` where it and the processor have it.
 
     Returns:
@@ -248,8 +239,7 @@ def run_bench(
     rows = bench_rows(methods, scores, costs, np.random.default_rng(effort.seed))
     files = [file for of_unit in counted for file in of_unit["files"]]
     facts = _facts(command, data, timed_on, effort, methods, files)
-    changed = [_changed(method, timed_on, effort.threads) for method in methods if method.usual]
-    return Bench(rows, {**facts, "notes": notes, "runtimes": changed})
+    return Bench(rows, {**facts, "notes": notes})
 
 
 def scored_methods(bench_entries: Sequence[BenchEntry], threads: int) -> list[ScoredMethod]:
@@ -346,31 +336,6 @@ def _fingerprint(content: object) -> str:
     return sha256(repr(content).encode()).hexdigest()[:16]
 
 
-def _changed(method: BenchEntry, frames: Sequence[Frame], threads: int) -> dict[str, Any]:
-    """Compares a model in another runtime with the same model in onnxruntime.
-
-    Returns:
-        By the title ``method`` its ``runtime``, and the numbers of a
-        :class:`derain.export.proof.Proof` as JSON-able primitives, or its ``failure``.
-    """
-    from derain.export.proof import compare_runtimes  # here: it loads torch
-
-    changed = {"method": method.title, "runtime": str(method.runtime)}
-    assert method.usual is not None
-    try:
-        usual, other = method.usual(threads), method.ready(threads)
-        assert isinstance(usual, Derainer)
-        assert isinstance(other, Derainer)
-        # Nothing holds on to a scan while the next one is read.
-        scans = ((frame.name, frame.read()) for frame in frames)
-        proof = compare_runtimes(usual, other, scans)
-    except Exception as error:  # its row states whatever a runtime raises
-        return {**changed, "failure": reason_of(error)}
-    numbers = proof.as_dict()
-    del numbers["cases"]
-    return {**changed, **numbers, "scans": len(proof.cases)}
-
-
 def _facts(
     command: str,
     data: LabelledFrames,
@@ -381,7 +346,6 @@ def _facts(
 ) -> dict[str, Any]:
     """Everything that a bench depends on besides its methods, as JSON-able primitives."""
     card, frames = data.reader.card, data.frames
-    others = [method.runtime.name for method in methods if method.usual]
     return {
         "title": f"{card.title}, {counted(len(frames), 'scan')}",
         "command": command,
@@ -395,6 +359,6 @@ def _facts(
         "timed_on": [frame.name for frame in timed_on],
         "processor": processor(),
         "system": platform.platform(),
-        "versions": versions([DEFAULT_RUNTIME, *others]),
+        "versions": versions([DEFAULT_RUNTIME, *(method.runtime.name for method in methods)]),
         "files": files,
     }

@@ -64,7 +64,6 @@ class BenchEntry:
         filter: The filter, where it is one: filters share one search for neighbours.
         spec_or_filter: Checks whether a scan suits the method: a model's Spec, a filter or a rule.
         runtime: The runtime of a model.
-        usual: Makes the same model in onnxruntime in float32, where it has another runtime.
         learnt: Fingerprint of what a baseline has learnt, where its facts do not hold it.
     """
 
@@ -75,7 +74,6 @@ class BenchEntry:
     filter: FilterDerainer | None = None
     spec_or_filter: Spec | PointFilter | IntensityRule | None = None
     runtime: Runtime = field(default_factory=Runtime)
-    usual: Callable[[int], TimedMethod] | None = None
     learnt: str = ""
 
     @property
@@ -147,7 +145,7 @@ def _with_runtime_variants(rows: Sequence[BenchEntry], runtime: Runtime) -> list
     beside = []
     for row in rows:
         beside.append(row)
-        if isinstance(row.spec_or_filter, Spec) and row.usual is None:
+        if isinstance(row.spec_or_filter, Spec) and row.runtime.is_default:
             beside.append(replace(_with_runtime(row, runtime), title=f"{row.title} ({runtime})"))
     if len(beside) == len(rows):
         raise InputError(f"runtime {runtime}", "none of the methods is a model", "Leave it out.")
@@ -164,7 +162,7 @@ def _with_runtime(row: BenchEntry, runtime: Runtime) -> BenchEntry:
     ready = partial(make, runtime=runtime)
     ready(1)  # refused before any work
     facts = {**row.facts, "runtime": str(runtime)}  # one text, because precision is also a score
-    return replace(row, ready=ready, facts=facts, runtime=runtime, usual=row.ready)
+    return replace(row, ready=ready, facts=facts, runtime=runtime)
 
 
 def _bench_entry(method: GivenMethod, learn_from: LearnFrom | None) -> BenchEntry:

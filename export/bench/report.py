@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from derain.cards.card import DataCard
-from derain.errors import counted
 from derain.evaluation.counts import SCORES, Counts, mean_over_scans
 from derain.evaluation.published_tables import PaperTable, PublishedRow
 from derain.evaluation.text_tables import markdown_table, number_text
@@ -36,12 +35,6 @@ READING = """\
   libraries included.
 - `position` uses only the places of rain in the training scans, `intensity` only that rain is dim
   and near; `all` and `none` use nothing. A method that does not beat them has learnt nothing."""
-
-
-OTHER_RUNTIMES = """\
-Each model on another runtime, compared with onnxruntime in float32 on the timed scans: the largest
-difference of a logit, relative to the scan's largest logit if that is above 1; points or pixels on
-the other side of the threshold; and the IoU of the rain that the two find."""
 
 
 def write_report(rows: Sequence[Row], facts: Mapping[str, Any], out: Path) -> None:
@@ -96,8 +89,6 @@ def as_markdown(rows: Sequence[Row], facts: Mapping[str, Any]) -> str:
     if rows[0].scores.by_sensor:
         parts += ["## IoU by sensor", _groups(rows, lambda row: row.scores.by_sensor)]
     parts += ["## Milliseconds by stage, median and 95th percentile", _by_stage(rows)]
-    if changed := facts.get("runtimes"):
-        parts += ["## Other runtimes", runtimes_table(changed), OTHER_RUNTIMES]
     if failures := failures_of(rows):
         parts += ["## Failures", failures]
     return "\n\n".join([*parts, facts["versions"]])
@@ -117,16 +108,6 @@ def main_table(rows: Sequence[Row], columns: Sequence[str] | None = None) -> str
     cells = [_main_cells(row) for row in rows]
     titles = columns or [*cells[0]]
     return markdown_table(titles, [[of_row[title] for title in titles] for of_row in cells])
-
-
-def runtimes_table(changed: Sequence[Mapping[str, Any]]) -> str:
-    """Each model in another runtime, compared with the same model in onnxruntime.
-
-    Args:
-        changed: One or more comparisons, as a bench has them under ``runtimes``.
-    """
-    head = ["method", "beside onnxruntime", "largest logit difference", "labels flipped"]
-    return markdown_table([*head, "IoU of the rain"], [_changed_cells(row) for row in changed])
 
 
 def draw_speed_error(rows: Sequence[Row], facts: Mapping[str, Any], path: Path) -> None:
@@ -189,18 +170,6 @@ def with_published_rows(
         f"(*) {row.method}, {row.group}: {row.misprint}." for row in published if row.misprint
     ]
     return "\n\n".join([*parts, *misprints])
-
-
-def _changed_cells(row: Mapping[str, Any]) -> list[str]:
-    if "failure" in row:
-        return [row["method"], row["failure"], "-", "-", "-"]
-    return [
-        row["method"],
-        f"{counted(row['scans'], 'scan')}, {row['points']:,} points or pixels",
-        f"{row['largest_difference']:.1e}",
-        f"{row['flipped']:,}",
-        number_text(row["rain_iou"], ".4f"),
-    ]
 
 
 def _main_cells(row: Row) -> dict[str, str]:
