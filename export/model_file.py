@@ -49,9 +49,6 @@ GRAPH, INITIALIZER, DIMENSIONS = 7, 5, 1
 METADATA_PROPS, PROP_KEY, PROP_VALUE = 14, 1, 2
 EXTERNAL_DATA, DATA_LOCATION = 13, 14
 
-# How files of torch.save begin: archives, and before PyTorch 1.6 pickles. No ONNX file does.
-PYTORCH_SIGNATURES = (b"PK\x03\x04", b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05")
-
 # Kinds of protobuf fields. Source: https://protobuf.dev/programming-guides/encoding.
 VARINT, COUNTED_BYTES = 0, 2
 SIZES = {1: 8, 5: 4}  # of the others, in bytes
@@ -84,13 +81,6 @@ class ModelFile:
         """
         with reading(path), path.open("rb") as file:
             content = file.read(LARGEST_MODEL + 1)
-        if content.startswith(PYTORCH_SIGNATURES):
-            raise InputError(
-                path,
-                "not an ONNX model, but an archive or a pickle, as PyTorch saves weights",
-                "Make a checkpoint of weights with `derain import-weights`, and a model of that "
-                "with `derain export`.",
-            )
         if len(content) > LARGEST_MODEL:
             raise _not_a_model(path, f"more than {LARGEST_MODEL:,} bytes")
         try:
@@ -229,5 +219,7 @@ def _varint(message: memoryview, place: int) -> tuple[int, int]:
 
 def _not_a_model(path: Path, reason: str) -> InputError:
     return InputError(
-        path, f"not an ONNX model ({reason})", "Give a model written by `derain export`."
+        path,
+        f"not an ONNX model ({reason})",
+        "Give a model written by `derain export`; `derain import-weights` reads PyTorch's weights.",
     )
