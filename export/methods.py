@@ -182,27 +182,17 @@ def load_method_of_one_scan(
     """Makes a method ready to judge scans one by one; arguments and errors as there.
 
     Raises:
-        InputError: A method that sees several scans, besides.
+        InputError: A method that sees several scans, besides: it would be measured without what it
+            is meant to see.
     """
     method = load_method(name, parameters, threads, runtime)
-    require_one_scan(method)
     if not isinstance(method, Derainer | FilterDerainer):
-        raise InputError(name, "is no filter and no model", "Use `derain run` with it.")
-    return method
-
-
-def require_one_scan(method: Method) -> None:
-    """Refuses a method that sees several scans at a time, where scans are measured one by one.
-
-    Raises:
-        InputError: Such a method: it would be measured without what it is meant to see.
-    """
-    if not method.window.is_one_scan:
         raise InputError(
-            method.as_dict()["method"],
+            name,
             "sees the scans around the one that it judges, which this command does not provide",
             "Use `derain run`, or `derain teach --card`, which compares its answers with labels.",
         )
+    return method
 
 
 def _refuse_runtime(name: str, kind: str, runtime: Runtime) -> None:

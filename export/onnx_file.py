@@ -56,7 +56,7 @@ def export(
         runtime: Runtime of the file, which is proved by that too where it is not onnxruntime.
 
     Returns:
-        The proof, which the file's metadata holds as well.
+        The proof; the file's metadata hold that of onnxruntime.
 
     Raises:
         InputError: A model without a Spec, an output that cannot be written, a runtime that cannot
@@ -69,11 +69,11 @@ def export(
             proto = quantised(proto, model.spec.make_view(), calibration, model.INTEGER_OPERATORS)
         temporary.write_bytes(_described(proto, model.spec, {}))
         proof = _proof(model, temporary, calibration, Runtime())
+        known = {"proof": proof.as_dict(), "flushed": flushed}
         if not runtime.is_default:
-            proof = replace(proof, by_other=_proof(model, temporary, calibration, runtime))
+            proof = Proof(proof.cases + _proof(model, temporary, calibration, runtime).cases)
         if not proof.holds:
             raise InputError(path, f"the exported model differs:\n{proof}", "No file was left.")
-        known = {"proof": proof.as_dict(), "flushed": flushed}
         temporary.write_bytes(_described(proto, model.spec, known))
         onnx.checker.check_model(proto, full_check=True)
     return proof

@@ -95,8 +95,9 @@ class Case:
 
     def __str__(self) -> str:
         failed = "" if self.holds else "FAILED "
+        by = "" if self.runtime == DEFAULT_RUNTIME else f"{self.runtime}: "
         return (
-            f"{failed}{self.name}: {self.points:,} points, {self.threads} threads, "
+            f"{by}{failed}{self.name}: {self.points:,} points, {self.threads} threads, "
             f"largest difference {self.difference:.1e}, {self.flipped} flipped"
         )
 
@@ -106,18 +107,15 @@ class Proof:
     """The comparison of an exported model with PyTorch on all scans.
 
     Attributes:
-        cases: The scans, on each number of threads.
-        by_other: How it compares by a runtime other than onnxruntime, where one is named.
+        cases: The scans, on each number of threads, by each runtime.
     """
 
     cases: tuple[Case, ...]
-    by_other: "Proof | None" = None
 
     @property
     def holds(self) -> bool:
         """True if every case does, and both find enough of the same rain."""
-        other_holds = self.by_other is None or self.by_other.holds
-        return other_holds and self.finds_enough and all(case.holds for case in self.cases)
+        return self.finds_enough and all(case.holds for case in self.cases)
 
     @property
     def least_rain_iou(self) -> float | None:
@@ -156,18 +154,16 @@ class Proof:
 
     def as_dict(self) -> dict[str, Any]:
         """The proof as JSON-able primitives."""
-        other = {} if self.by_other is None else {"by_other": self.by_other.as_dict()}
         return {
             "largest_difference": self.worst.difference,
             "flipped": self.flipped,
             "points": self.points,
             "rain_iou": or_none(self.rain_iou),
             "cases": [asdict(case) for case in self.cases],
-            **other,
         }
 
     def __str__(self) -> str:
-        """The worst case and those that fail, and a summary; each line names another runtime."""
+        """The worst case and those that fail, and a summary."""
         lines = [str(case) for case in self.cases if not case.holds or case is self.worst]
         lines.append(
             f"{len(self.cases)} cases, {self.points:,} points or pixels: largest logit "
@@ -176,10 +172,6 @@ class Proof:
         )
         if not self.finds_enough:
             lines.append(f"FAILED: the IoU of the rain must be {self.least_rain_iou:g}")
-        if self.worst.runtime != DEFAULT_RUNTIME:
-            lines = [f"{self.worst.runtime}: {line}" for line in lines]
-        if self.by_other is not None:
-            lines.append(str(self.by_other))
         return "\n".join(lines)
 
 

@@ -20,7 +20,6 @@ from derain.export.methods import (
     load_method_of_one_scan,
     named_method,
     refuse_same_titles,
-    require_one_scan,
     split_title,
 )
 from derain.export.model_file import number_of_weights
@@ -227,7 +226,6 @@ def _ready_filter(derainer: FilterDerainer, threads: int) -> FilterDerainer:
 def _model(
     title: str, name: str, derainer: Derainer, ready: Callable[[int], FilterDerainer | Derainer]
 ) -> BenchEntry:
-    require_one_scan(derainer)
     spec, content = derainer.spec, derainer.path.read_bytes()
     facts = {
         "model": name,

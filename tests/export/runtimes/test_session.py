@@ -112,9 +112,9 @@ def test_an_export_for_another_runtime_is_proved_by_that_as_well(
     with pytest.raises(InputError, match="rainy int2: FAILED scene"):
         onnx_file.export(model, path, runtime=Runtime("rainy", "int2"))
     proof = onnx_file.export(model, path, runtime=Runtime("rainy"))
-    assert {case.runtime for case in proof.cases} == {"onnxruntime"}
-    assert {case.runtime for case in proof.by_other.cases} == {"rainy"}
-    assert Derainer(path, 1).metadata["proof"] == proof.as_dict()
+    assert {case.runtime for case in proof.cases} == {"onnxruntime", "rainy"}
+    written = Derainer(path, 1).metadata["proof"]["cases"]
+    assert {case["runtime"] for case in written} == {"onnxruntime"}
 
 
 def test_the_versions_name_each_package_that_ran_once(rainy, monkeypatch) -> None:
