@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from hashlib import sha256
 from typing import Any
-from weakref import WeakKeyDictionary
+from weakref import WeakKeyDictionary, WeakSet
 
 import numpy as np
 
@@ -54,7 +54,8 @@ class RecordedDerainer(PlacedMethod):
     their own ends are rain by the model. Those that went through the place show that nothing was.
     Where the sensor was comes from the poses of the frames, or else from odometry. A scan of which
     that is not known, or whose pose does not match what it shows, is judged alone. Rays of a scan
-    that the model cannot judge show nothing. Its stages are those of the model, odometry and rays.
+    that the model cannot judge show nothing; its own error names it. Its stages are those of the
+    model, odometry and rays.
 
     Example:
         >>> derainer = RecordedDerainer(Derainer("model.onnx"), past=1)
@@ -90,7 +91,8 @@ class RecordedDerainer(PlacedMethod):
         """Warnings about a scan for the model, and about the scans around it."""
         yield from self.model.issues(judgement)
         yield from self._recent.damage(judgement.scan)
-        yield from self._odd.get(judgement.scan, ())
+        if judgement.scan in self._unlike:
+            yield UNLIKE
 
     def as_dict(self) -> dict[str, Any]:
         """The model's name, its threshold, and the number of scans that it sees around one."""
@@ -108,7 +110,7 @@ class RecordedDerainer(PlacedMethod):
         self._recent = PlacedFrames(self.window, self.model.threads)
         self._rays: WeakKeyDictionary[Scan, Rays] = WeakKeyDictionary()
         self._alone: dict[Scan, Judgement | None] = {}
-        self._odd: WeakKeyDictionary[Scan, list[ScanIssue]] = WeakKeyDictionary()
+        self._unlike: WeakSet[Scan] = WeakSet()
 
     def _judged(self, ready: FrameInWindow, stopwatch: Stopwatch) -> Judgement:
         scans = ready.scans
@@ -119,7 +121,6 @@ class RecordedDerainer(PlacedMethod):
             alone = self._alone[scans.scan]
             if alone is None:
                 alone = self.model.judge_silently(scans.scan, stopwatch)  # which raises the reason
-        self._odd[scans.scan] = [_fails(scan) for scan, judged in self._alone.items() if not judged]
         with ready.naming_errors(), stopwatch.stage("rays"):
             probability = self._with_rays(alone, scans)
         rain = probability > self.model.spec.threshold
@@ -135,7 +136,7 @@ class RecordedDerainer(PlacedMethod):
             return alone.probability
         evidence = self._evidence(alone.scan, solid, doubtful, others)
         if evidence is None:
-            self._odd[alone.scan].append(UNLIKE)
+            self._unlike.add(alone.scan)
             return alone.probability
         probability = alone.probability.copy()
         certain = np.finfo(np.float64).eps
@@ -193,15 +194,6 @@ class RecordedDerainer(PlacedMethod):
         if scan not in self._rays:
             self._rays[scan] = Rays.of(scan, self.model.threads)
         return self._rays[scan]
-
-
-def _fails(scan: Scan) -> ScanIssue:
-    """Warnings about a scan beside one that the model cannot judge."""
-    name = scan.name or "a scan"
-    return ScanIssue(
-        "beside a scan that cannot be judged",
-        f"the model cannot judge {name}, which is beside it: the rays of that scan are not used",
-    )
 
 
 def solidity(probability: Float32s, half: float = HALF_SOLID) -> Floats:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from derain.errors import InputError, ScanWarning
+from derain.errors import InputError
 from derain.export.recorded import HALF_SOLID, RecordedDerainer, added_log_odds, solidity
 from derain.export.runtime import Derainer
 from derain.files.extrinsics import motion_of_pose
@@ -112,15 +112,6 @@ def test_scans_beside_one_that_fails_are_judged_without_it(model, posed, wrong) 
     for number in (0, 2):
         alone = model.judge(answers[number].scan).probability
         np.testing.assert_array_equal(answers[number].probability, alone)
-
-
-def test_a_scan_that_fails_is_named_once_to_those_beside_it(model) -> None:
-    frames = drive(4)
-    frames[1] = replace(frames[1], scan=replace(frames[1].scan, name=FAILS))
-    failures = Failures(lambda error: None)
-    with pytest.warns(ScanWarning) as caught:
-        list(judgements(RecordedDerainer(model, 1, 1), frames, failures.skipping_failures))
-    assert sum(FAILS in str(warning.message) for warning in caught) == 1
 
 
 def test_where_no_ray_is_near_nothing_is_added() -> None:
