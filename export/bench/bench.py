@@ -110,7 +110,7 @@ def bench(
     """Compares methods on the same labelled scans: error, time and memory.
 
     Each method is timed alone, in a process of its own. A function that is defined in the running
-    script or session cannot be sent to one; it is timed in this process, and its row states so.
+    script or session cannot be sent to one; it is timed in this process, and its row has no memory.
 
     Example:
         >>> import numpy as np

@@ -48,15 +48,14 @@ class Cost:
     Attributes:
         times: Milliseconds of each run.
         peak_memory: Largest resident memory of a process that does this alone, in MiB, Python and
-            its libraries included; None where it is not known, or the process did more.
+            its libraries included; None where it is not known, or the method could not be sent to
+            another process, and was timed in this.
         failure: The error that stopped it, if any; there are no runs then.
-        alone: True if it was measured in a process of its own.
     """
 
     times: RunTimes
     peak_memory: float | None
     failure: str | None = None
-    alone: bool = True
 
 
 def measure_cost(bench_entry: BenchEntry, frames: Sequence[Frame], effort: Effort) -> Cost:
@@ -69,12 +68,11 @@ def measure_cost(bench_entry: BenchEntry, frames: Sequence[Frame], effort: Effor
     """
     try:
         if not bench_entry.is_picklable:
-            here = measure_in_process(bench_entry, frames, effort)
-            return replace(here, peak_memory=None, alone=False)
+            return replace(measure_in_process(bench_entry, frames, effort), peak_memory=None)
         with WorkerPool(1) as pool:
             return pool.submit(measure_in_process, bench_entry, frames, effort).result()
     except Exception as error:  # its row states whatever a library raises
-        return Cost(RunTimes.of_no_runs(), None, reason_of(error), bench_entry.is_picklable)
+        return Cost(RunTimes.of_no_runs(), None, reason_of(error))
 
 
 def measure_in_process(bench_entry: BenchEntry, frames: Sequence[Frame], effort: Effort) -> Cost:

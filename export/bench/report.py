@@ -32,7 +32,7 @@ READING = """\
   scans. Consecutive scans are alike, which makes both too narrow.
 - ms are from file to mask, median and 95th percentile, each method alone in a process of its own
   and no search for neighbours shared. MiB is that process's largest resident memory, Python and its
-  libraries included.
+  libraries included; `-` where the method could not be sent to one, and was timed in the program's.
 - `position` uses only the places of rain in the training scans, `intensity` only that rain is dim
   and near; `all` and `none` use nothing. A method that does not beat them has learnt nothing."""
 
@@ -78,7 +78,6 @@ def as_markdown(rows: Sequence[Row], facts: Mapping[str, Any]) -> str:
         *(f"**{note}.**" for note in facts.get("notes", ())),
         main_table(rows),
         READING,
-        *_not_alone(rows),
         "## Called rain, by class",
         _by_class(rows),
         "## IoU by range",
@@ -219,16 +218,6 @@ def _by_stage(rows: Sequence[Row]) -> str:
         cells = [[number_text(time[p], ",.1f") for p in ("p50", "p95")] for time in times]
         body.append([row.title, *map(" / ".join, cells)])
     return markdown_table(["method", *STAGES], body)
-
-
-def _not_alone(rows: Sequence[Row]) -> list[str]:
-    titles = [row.title for row in rows if not row.cost.alone]
-    if not titles:
-        return []
-    return [
-        f"Timed in the process of the program that measures, where other methods had run before, "
-        f"for they cannot be sent to one of their own: {', '.join(titles)}."
-    ]
 
 
 def failures_of(rows: Sequence[Row]) -> str:

@@ -86,7 +86,6 @@ class Row:
             "by_sensor": _all_scores(scores.by_sensor),
             "failed_scans": dict(scores.failures),
             "not_timed": self.cost.failure,
-            **({} if self.cost.alone else {"timed_alone": False}),
             **self.bench_entry.facts,
         }
 

@@ -17,7 +17,6 @@ def test_a_process_of_its_own_holds_little_but_the_method(labelled) -> None:
     (row,) = bench_entries(["dsor"])
     held = np.ones(300_000_000, np.uint8)  # in this process, not in that one
     cost = measure_cost(row, labelled.frames[:1], Effort(threads=1, repeats=1))
-    assert cost.alone
     assert len(cost.times.stages["view"]) == 1
     assert held.nbytes / 2**20 > 250 > cost.peak_memory > 20
 

@@ -79,15 +79,13 @@ def test_json_and_csv_hold_the_same_figures(rows, tmp_path) -> None:
     assert content["rows"][2]["by_range"]["80+ m"]["iou"] is None  # no point is as far
 
 
-def test_the_tables_name_every_method_what_failed_and_what_was_not_timed_alone(rows) -> None:
-    here = replace(rows[1], cost=replace(rows[1].cost, alone=False))
-    text = as_markdown([rows[0], here, rows[2]], FACTS)
+def test_the_tables_name_every_method_and_what_failed(rows) -> None:
+    text = as_markdown(rows, FACTS)
     parts = {part.splitlines()[0]: part for part in text.split("\n## ")}
     for heading in ("Called rain, by class", "IoU by range", "IoU by rain rate"):
         assert all(f"| {row.title} " in parts[heading] for row in rows)
     assert "broken: 3 of 3 scans, first" in text
     assert "broken could not be timed: no room" in text
-    assert "of their own: all." in text
     assert "IoU by sensor" not in parts
     # A score that is undefined is a dash: the first finds nothing in the farthest band.
     (main,) = [line for line in text.splitlines() if line.startswith("| broken (!) |")]
