@@ -2,7 +2,6 @@
 
 import io
 import math
-import sys
 from collections.abc import Iterator
 from itertools import chain, islice
 from typing import Any
@@ -13,6 +12,11 @@ from derain.scan import Array
 
 # Bytes of a header, which has a line or a word for each column.
 LARGEST_HEADER = 2**20
+
+# Number of a line, from 1, and its content without the end of line.
+Line = tuple[int, bytes]
+
+BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 # Enough digits for every float32 and every float64 to come back as it was.
 _DECIMALS = {"f4": "%.9g", "f8": "%.17g"}
@@ -28,25 +32,27 @@ def encode(text: str) -> bytes:
     return text.encode("utf-8", "surrogateescape")
 
 
-def _filled_lines(data: bytes, start: int = 0, count: int = sys.maxsize) -> Iterator[bytes]:
-    """The lines of a text that are not empty: ``count`` of them, after ``start`` others."""
-    filled = (line for line in io.BytesIO(data) if line.strip())
-    return islice(filled, *(min(place, sys.maxsize) for place in (start, start + count)))
+def filled_lines(text: bytes) -> Iterator[Line]:
+    """The lines of a text that are not empty."""
+    for number, line in enumerate(io.BytesIO(text), 1):
+        if line.strip() not in (b"", BYTE_ORDER_MARK):
+            yield number, line.rstrip(b"\r\n")
 
 
-def parse_rows(data: bytes, row: np.dtype[Any], start: int = 0, count: int = sys.maxsize) -> Array:
+def parse_rows(data: bytes, row: np.dtype[Any], start: int = 0, count: int | None = None) -> Array:
     """Reads one structured value per line of numbers; empty lines are skipped.
 
     Args:
         data: The text.
         row: Dtype of a line; its fields may be sub-arrays.
         start: Number of lines that come before.
-        count: Number of lines to read, if there are as many.
+        count: Number of lines to read, if there are as many; None reads all.
 
     Raises:
-        ValueError: A line that is not of this dtype.
+        ValueError: A line that is not of this dtype, or more lines than can be counted.
     """
-    lines = _filled_lines(data, start, count)
+    asked = islice(filled_lines(data), start, None if count is None else start + count)
+    lines = (line for _, line in asked)
     first = next(lines, None)
     if first is None:
         return np.empty(0, row)

@@ -19,20 +19,14 @@ from derain.files.columns import Columns, columns_of, name_columns, no_place, sc
 from derain.files.content import Content, check_columns
 from derain.files.format import FORMATS, Format
 from derain.files.names import scan_suffix
-from derain.files.text import decode, encode
+from derain.files.text import BYTE_ORDER_MARK, Line, decode, encode, filled_lines
 from derain.scan import Array, Ints, Scan
-
-_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 # What some programs put before the line of names.
 _COMMENT = re.compile(r"\s*(#|//)")
 
 # Lines that are held as text at a time, which takes ten times the memory of their numbers.
 _CHUNK = 4096
-
-
-# Number of a line, from 1, and its content without the end of line.
-Line = tuple[int, bytes]
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +62,7 @@ class TableHeader:
     def lines(self) -> bytes:
         """The line of names, if there is one, and the lines of the points, as they were written."""
         newline = b"\r\n" if b"\r\n" in self.text else b"\n"
-        lines = [line for _, line in _filled_lines(self.text)]
+        lines = [line for _, line in filled_lines(self.text)]
         rows = [*range(self.named), *self.rows.tolist()]
         return b"".join(lines[row] + newline for row in rows)
 
@@ -156,11 +150,11 @@ def _parse_table(text: bytes) -> TableHeader:
             name.
         csv.Error: Quotes that do not match.
     """
-    lines = _filled_lines(text)
+    lines = filled_lines(text)
     number, line = next(lines, (0, None))
     if line is None:
         return TableHeader(",", False, text, np.empty(0, np.int64), {})
-    first = decode(line.removeprefix(_BYTE_ORDER_MARK))
+    first = decode(line.removeprefix(BYTE_ORDER_MARK))
     separator = next((each for each in ",;" if each in first), None)
     (values,) = _rows([_COMMENT.sub("", first)], separator)
     check_columns(len(values))
@@ -175,13 +169,6 @@ def _parse_table(text: bytes) -> TableHeader:
     numbers = _parse_lines(lines, separator, titles)
     rows = np.arange(len(numbers[0])) + named
     return TableHeader(separator, named, text, rows, dict(zip(titles, numbers, strict=True)))
-
-
-def _filled_lines(text: bytes) -> Iterator[Line]:
-    """The lines of a text that are not empty."""
-    for number, line in enumerate(io.BytesIO(text), 1):
-        if line.strip() not in (b"", _BYTE_ORDER_MARK):
-            yield number, line.rstrip(b"\r\n")
 
 
 def _parse_lines(
