@@ -104,10 +104,6 @@ class Spec:
         """True if intensities matter to the network, as a channel or by how its view ranks them."""
         return "intensity" in self.channels or VIEWS[self.view["kind"]].WEIGHS_INTENSITY
 
-    def missing_channels(self, scan: Scan) -> dict[str, float]:
-        """Channels that a scan lacks, and the means that replace them, by name."""
-        return {name: mean for name, mean in self.means.items() if scan.channel(name) is None}
-
     def issues(self, scan: Scan) -> Iterator[ScanIssue]:
         """Warnings about a scan for the network, before it is judged.
 
@@ -115,7 +111,7 @@ class Spec:
             scan: The scan, its intensities in the unit of the training data.
         """
         yield from viewpoint_issues(scan)
-        yield from missing_channels(scan, self.missing_channels(scan), self.data)
+        yield from missing_channels(scan, self.means, self.data)
         mean = self.means.get("intensity", 0.0)  # 0 for a network that sees none
         yield from intensity_unlike_training(scan, mean, self.intensity_unit, self.data)
         if self.weighs_intensity and "intensity" not in self.channels:

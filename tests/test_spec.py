@@ -167,8 +167,18 @@ def test_a_range_view_survives_json_with_its_grid_and_way_back(way_back) -> None
 def test_what_a_scan_lacks_is_what_its_means_stand_in_for() -> None:
     spec = replace(SPEC, channels=("x", "intensity", "radar", "doppler"))
     xyz = np.ones((2, 3), np.float32)
-    assert spec.missing_channels(Scan(xyz)) == {"intensity": 2.0, "radar": 3.0, "doppler": 4.0}
+
+    def replaced(scan: Scan) -> list[str]:
+        found = (issue.detail for issue in spec.issues(scan))
+        return [detail for detail in found if "replaced by the mean of somewhere" in detail]
+
+    lacking = replaced(Scan(xyz))
+    assert [detail.partition(":")[0] for detail in lacking] == [
+        "no intensity",
+        "no radar",
+        "no doppler",
+    ]
+    assert [detail.rpartition(" ")[2] for detail in lacking] == ["2", "3", "4"]
     gaps = Scan(xyz, np.ones(2, np.float32), fields={"Doppler": np.full(2, np.nan)})
-    assert spec.missing_channels(gaps) == {"radar": 3.0}
-    fused = replace(gaps, radar=np.array([False, True]))
-    assert spec.missing_channels(fused) == {}
+    assert len(replaced(gaps)) == 1
+    assert replaced(replace(gaps, radar=np.array([False, True]))) == []

@@ -40,19 +40,20 @@ class ScanIssue:
     detail: str
 
 
-def missing_channels(scan: Scan, fill_value: Mapping[str, float], data: str) -> Iterator[ScanIssue]:
+def missing_channels(scan: Scan, means: Mapping[str, float], data: str) -> Iterator[ScanIssue]:
     """Yields an issue for each channel of a model that a scan lacks.
 
     Args:
         scan: The scan.
-        fill_value: The channels that it lacks, and the means that replace them.
+        means: The model's channels, and the means that replace those that a scan lacks.
         data: Name of the data that the means are of.
     """
     if not scan.valid.any():
         return
-    for name, mean in fill_value.items():
-        lack = _lack(scan) if name == "intensity" else f"no {name}"
-        yield ScanIssue(lack, f"{lack}: replaced by the mean of {data}, {mean:.3g}")
+    for name, mean in means.items():
+        if scan.channel(name) is None:
+            lack = _lack(scan) if name == "intensity" else f"no {name}"
+            yield ScanIssue(lack, f"{lack}: replaced by the mean of {data}, {mean:.3g}")
 
 
 def missing_intensity(
