@@ -111,7 +111,12 @@ class McapFile:
             raise ValueError("it has no index")
         self.statistics: Statistics = summary[Statistics][0]
         others = self.statistics.attachment_count + self.statistics.metadata_count
-        if len(chunks) != self.statistics.chunk_count or len(self._others) != others:
+        counted = self.statistics.channel_message_counts.keys()
+        if (
+            len(chunks) != self.statistics.chunk_count
+            or len(self._others) != others
+            or not counted <= self.connections.keys()
+        ):
             raise ValueError("its index is not whole")
 
     def messages(self, channels: Container[int], start: int = 0) -> Iterator[Message]:
