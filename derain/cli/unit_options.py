@@ -76,25 +76,19 @@ def add_shard(group: "argparse._ArgumentGroup") -> None:
     """Declares the option of :func:`shard_of`."""
     group.add_argument(
         "--shard",
-        type=shard,
         metavar="I/N",
         help="process shard I of N, from 0 on (default: from SLURM_ARRAY_TASK_ID, if set)",
     )
 
 
-def shard(text: str) -> Shard:
-    """A shard of the units."""
-    try:
-        return Shard.of_text(text)
-    except InputError as error:
-        raise argparse.ArgumentTypeError(f"{error.reason}") from error
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
-
-
 def shard_of(arguments: argparse.Namespace) -> Shard | None:
-    """The shard of the work to do, with a warning if it comes from SLURM alone; None for all."""
-    found: Shard | None = arguments.shard or Shard.of_environment()
+    """The shard of the work to do, with a warning if it comes from SLURM alone; None for all.
+
+    Raises:
+        InputError: No such shard.
+    """
+    named = arguments.shard
+    found = Shard.of_environment() if named is None else Shard.of_text(named)
     if found is not None and found.of_array:
         warn(
             f"{TASK} is {found.number + found.first}: "

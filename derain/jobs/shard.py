@@ -52,11 +52,11 @@ class Shard:
         """Parses ``I/N``; the first shard is 0/N.
 
         Raises:
-            ValueError: Other text.
+            InputError: Other text, or no such shard.
         """
         match = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", text, re.ASCII)
         if match is None:
-            raise ValueError(f"{text} is not I/N, such as 0/4")
+            raise InputError("--shard", f"{text} is not I/N", "Give for instance 0/4.")
         return cls(int(match[1]), int(match[2]))
 
     @classmethod
