@@ -90,13 +90,9 @@ def main(arguments: list[str] | None = None) -> int:
         return _cut_off(error)
     except KeyboardInterrupt as interruption:
         return _interrupted(interruption)
-    except RuntimeError as error:
-        if isinstance(error.__cause__, KeyboardInterrupt):  # raised while a class was being made
-            return _interrupted(error.__cause__)
-        raise
-    except SystemExit as leaving:
-        if isinstance(leaving.__context__, KeyboardInterrupt):  # Lightning leaves in its own way
-            return _interrupted(leaving.__context__)
+    except (RuntimeError, SystemExit) as error:  # of a class being made, and of Lightning
+        if isinstance(error.__context__, KeyboardInterrupt):
+            return _interrupted(error.__context__)
         raise
     except OSError as error:
         remedy = "Check the path, its permissions, and the free space on its disk."
