@@ -111,16 +111,12 @@ def division_of(arguments: argparse.Namespace) -> Division:
     return Division(arguments.block, of_shard, keep, arguments.anew)
 
 
-def workers_of(arguments: argparse.Namespace, count_units: Callable[[], int]) -> int:
+def _workers_of(arguments: argparse.Namespace, method: Method, source: Source) -> int:
     """The number of processes.
 
     Unless it is named, there are as many as threads where each has several units to do: they are
     faster then, also on two cores (BENCHMARK.md). Otherwise there is one, as in a shard of the
     work, of which a batch system may start several on a machine.
-
-    Args:
-        arguments: The options.
-        count_units: Counts the units.
     """
     if arguments.workers is not None:
         return int(arguments.workers)
@@ -128,7 +124,10 @@ def workers_of(arguments: argparse.Namespace, count_units: Callable[[], int]) ->
         return 1
     cores = threads_of(arguments.threads)
     fitting = min(cores, total_memory() // MEMORY_OF_WORKER)
-    return fitting if fitting > 1 and count_units() >= UNITS_OF_WORKER * fitting else 1
+    if fitting <= 1:
+        return 1
+    units = units_of(source, method, arguments.block)
+    return fitting if len(units) >= UNITS_OF_WORKER * fitting else 1
 
 
 def share_threads(arguments: argparse.Namespace, workers: int) -> bool:
@@ -173,7 +172,7 @@ def method_and_workers(
         source: The scans.
         arguments: The options.
     """
-    workers = workers_of(arguments, lambda: len(units_of(source, method, arguments.block)))
+    workers = _workers_of(arguments, method, source)
     return (remake() if share_threads(arguments, workers) else method), workers
 
 
