@@ -33,7 +33,6 @@ from derain.sources.frame import Frame
 from derain.sources.spread import evenly_spaced
 from derain.system.extras import EXPORT_LIBRARIES, require
 from derain.system.notices import Notices
-from derain.views.candidate_fit import RAIN_INSIDE
 from derain.views.channels import extra_channels, with_columns
 
 if TYPE_CHECKING:
@@ -66,11 +65,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="labelled scans, folders of them, or a data set, to fit bounds of rain to",
     )
     parser.add_argument(
-        "--inside",
-        type=options.share,
-        help=f"share of the rain found that is within the bounds (default: {RAIN_INSIDE:g})",
-    )
-    parser.add_argument(
         "--card", help="data card of the labelled scans (default: found by their folders)"
     )
     parser.add_argument(
@@ -96,8 +90,6 @@ def main(arguments: argparse.Namespace) -> int:
     out, scan = arguments.out, arguments.scan
     if scan is not None and not (is_file(scan) or split(scan)):
         raise InputError(scan, "there is no such file", "Check --scan.")
-    if arguments.inside is not None and not arguments.candidates:
-        raise InputError("--inside", "bounds candidates, and there are none", "Give --candidates.")
     if arguments.int8 != bool(arguments.calibration):
         reason = "needs --calibration, and that needs it"
         raise InputError("--int8", reason, "Give both or neither.")
@@ -114,9 +106,7 @@ def main(arguments: argparse.Namespace) -> int:
         notices.warn(frame.name, model.spec.issues(frame.read()))
     notices.warn_of_repeats()
     if arguments.candidates:
-        data = options.labelled(arguments.candidates, arguments)
-        inside = RAIN_INSIDE if arguments.inside is None else arguments.inside
-        _fit_candidates(model, data, inside)
+        _fit_candidates(model, options.labelled(arguments.candidates, arguments))
     print(export(model, out, calibration, runtime))
     print_lines(f"Wrote {out} ({out.stat().st_size:,} bytes)\n")
     threads, repeats = arguments.threads, arguments.repeats
@@ -124,7 +114,7 @@ def main(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _fit_candidates(model: "DerainingModule", data: "LabelledScans", inside: float) -> None:
+def _fit_candidates(model: "DerainingModule", data: "LabelledScans") -> None:
     """Fits a model's candidates to labelled scans, and prints their bounds and their cost."""
     from derain.export.candidates import fit_network_candidates
     from derain.learning.task import EXAMPLE_SCANS
@@ -137,7 +127,7 @@ def _fit_candidates(model: "DerainingModule", data: "LabelledScans", inside: flo
         return with_columns(scan, extra_channels(model.channels))
 
     scans = map(read, evenly_spaced(data.frames("train"), EXAMPLE_SCANS))
-    fitted = fit_network_candidates(model, scans, data.card, inside)
+    fitted = fit_network_candidates(model, scans, data.card)
     notices.warn_of_repeats()
     model.adopt(replace(model.spec, candidates=fitted.candidates))
     print(fitted)

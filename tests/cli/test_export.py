@@ -75,7 +75,7 @@ def test_candidates_are_fitted_to_labelled_scans_and_their_cost_is_printed(
     succeed, checkpoint, onnx_model, scans, tmp_path, monkeypatch
 ) -> None:
     out, few = tmp_path / "candidates.onnx", sorted(scans.glob("*.bin"))[:2]
-    options = ["--candidates", *few, "--card", "wads", "--inside", "0.9"]
+    options = ["--candidates", *few, "--card", "wads"]
     outcome = succeed("export", checkpoint, "--out", out, *options, "--repeats", "1")
     derainer, of_all = Derainer(out, 1), Derainer(onnx_model, 1)
     candidates = derainer.spec.candidates
@@ -93,7 +93,7 @@ def test_scans_that_candidates_are_fitted_to_count_once_and_are_warned_of(
     monkeypatch.setattr(onnx_file, "export", lambda model, path, *_: path.touch())
     monkeypatch.setattr("derain.export.timing.measure_latency", lambda *_: "times")
     scan, label = scans / "00.bin", scans / "00.label"
-    options = ["--candidates", scan, "--card", "wads", "--inside", "0.9"]
+    options = ["--candidates", scan, "--card", "wads"]
     command = ["export", checkpoint, "--out", "outdet.onnx", *options]
     once = run_derain(*command)
     assert once.messages == []
@@ -135,7 +135,6 @@ def test_a_model_in_eight_bits_is_scaled_by_scans_like_those_it_will_see(
         (["--int8", "--calibration", "none"], "none: "),
         (["--int8", "--calibration", "empty"], "empty: "),
         (["--int8", "--calibration", "scans"], "no convolution to quantise"),
-        (["--inside", "0.99"], "--inside: bounds candidates, and there are none"),
         (["--candidates", "scans"], "nothing in it shows which labels are rain"),
         (["--candidates", "bare.bin", "--card", "wads"], "bare.bin: its labels are not at"),
         (["--candidates", "none", "--card", "wads"], "none: "),
