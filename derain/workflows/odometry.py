@@ -14,7 +14,7 @@ from derain.errors import InputError
 from derain.files.atomic import require_writable
 from derain.files.reading import is_file
 from derain.recordings.odometry import FrameOdometry, Registration
-from derain.sources.frame import Frame, times_of
+from derain.sources.frame import Frame
 from derain.sources.judging import Guard, unguarded
 from derain.sources.recordings import recordings_of
 from derain.sources.source import Source
@@ -34,14 +34,12 @@ class FoundPoses:
         file: The file or folder to write to.
         frames: The scans, in time order.
         registrations: Registration of each scan.
-        times: Times of the scans, seconds; empty unless all are known.
         fault: Why the file could not be written; None where it is.
     """
 
     file: Path
     frames: Sequence[Frame]
     registrations: Sequence[Registration]
-    times: Sequence[float]
     fault: InputError | None = None
 
     @property
@@ -54,8 +52,6 @@ class FoundPoses:
             return f"{self.file}: 1 scan shows no motion: its pose is the identity"
         moves = self.registrations[1:]
         path = sum(each.distance for each in moves)
-        lasted = self.times[-1] - self.times[0] if self.times else 0.0
-        speed = f", {path / lasted:.1f} m/s" if lasted > 0 else ""
         residuals = [
             (each.residual, frame.key)
             for each, frame in zip(moves, self.frames[1:], strict=True)
@@ -65,7 +61,7 @@ class FoundPoses:
         usual = median([residual for residual, _ in residuals] or [math.nan])
         return (
             f"{self.file}: {len(self.registrations):,} scans, path {path:.1f} m, "
-            f"{path / len(moves):.2f} m a scan{speed}; residual median {usual:.3f} m, worst "
+            f"{path / len(moves):.2f} m a scan; residual median {usual:.3f} m, worst "
             f"{worst:.3f} m ({of_scan}); {self.untrusted:,} not to be trusted"
         )
 
@@ -98,16 +94,15 @@ def find_poses(
     """
     recordings = recordings_of(source)
     files = _files_of(recordings, out, replace)
-    times = [times_of(recording) or [] for recording in recordings]
     odometry = FrameOdometry(threads)
     found = []
     with tqdm(total=len(source), desc="odometry", unit="scan", disable=None) as bar:
-        for file, recording, seconds in zip(files, recordings, times, strict=True):
+        for file, recording in zip(files, recordings, strict=True):
             registrations = []
             for frame in recording:
                 registrations.append(_register(frame, odometry, guard, watch))
                 bar.update()
-            poses = FoundPoses(file, recording, registrations, seconds)
+            poses = FoundPoses(file, recording, registrations)
             try:
                 _write(poses)
             except InputError as error:  # the other recordings go on

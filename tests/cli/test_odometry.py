@@ -54,12 +54,6 @@ def test_poses_are_written_and_found_beside_the_scans(run_derain, recording) -> 
     assert {path.name for path in recording.parent.iterdir()} == {"velodyne", "poses.txt"}
 
 
-def test_the_summary_gives_a_speed_where_times_are_known(succeed, recording, tmp_path) -> None:
-    (recording.parent / "times.txt").write_text("5.0\n5.1\n5.2\n5.3\n")
-    outcome = succeed("odometry", recording, "--out", tmp_path / "poses.txt")
-    assert re.search(r"[89]\.\d m/s", outcome.out)
-
-
 def test_one_scan_has_the_identity_and_a_note(succeed, recording, tmp_path) -> None:
     out = tmp_path / "poses.txt"
     outcome = succeed("odometry", recording / "000000.bin", "--out", out)
