@@ -59,6 +59,9 @@ class DataCard:
             the card.
         parts: Ids of the classes of each of several data sets that it is the card of, by name; no
             file has it.
+
+    Raises:
+        InputError: Two classes of one name; rain that is no class, or unknown that is none or rain.
     """
 
     name: str
@@ -75,6 +78,16 @@ class DataCard:
     layout: Layout = field(default_factory=Layout)
     auto_detect: AutoDetect = "nothing"
     parts: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        known, remedy = set(self.classes), "Name ids that are listed under classes."
+        if len(set(self.classes.values())) < len(known):
+            raise InputError("classes", "two classes have the same name", "Give each its own.")
+        if not known.issuperset(self.rain):
+            raise InputError("rain", f"{shown(list(self.rain))} are not all ids of classes", remedy)
+        if not (known - set(self.rain)).issuperset(self.unknown):
+            reason = f"{shown(list(self.unknown))} are not all ids of classes that are not rain"
+            raise InputError("unknown", reason, remedy)
 
     @property
     def title(self) -> str:
@@ -204,21 +217,11 @@ def load_card(name: str | Path) -> DataCard:
         moments["range"] = of_range
     if mean is not None and std is not None:
         moments |= zip(CHANNELS_OF_STATISTICS, zip(mean, std, strict=True), strict=True)
-    card = DataCard(**found, moments=moments)
-    members = document.members()
-    if len(set(card.classes.values())) < len(card.classes):
-        raise members["classes"].fault("two classes have the same name", "Give each its own.")
-    for key, ids, known in (
-        ("rain", card.rain, card.classes.keys()),
-        ("unknown", card.unknown, card.classes.keys() - set(card.rain)),
-    ):
-        if not known >= set(ids):
-            raise members[key].fault(
-                f"{shown(list(ids))} are not all ids of classes"
-                f"{' that are not rain' if key == 'unknown' else ''}",
-                "Name ids that are listed under classes.",
-            )
-    return card
+    try:
+        return DataCard(**found, moments=moments)
+    except InputError as error:
+        place = f"{document.source}: {error.subject}"
+        raise InputError(place, error.reason, error.remedy) from error
 
 
 def _ids(entry: Entry) -> tuple[int, ...]:

@@ -1,7 +1,7 @@
 """Points by truth, answer, class and band of range, and the scores that follow from them."""
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import astuple, dataclass
 from itertools import pairwise
 
@@ -195,15 +195,11 @@ class RainCounts:
         cells: Points by class, by band of range and by whether they are called rain, int64
             (classes, bands, 2).
         per_scan: Counts of each scan, in the order in which they were added.
-
-    Raises:
-        InputError: Two classes of one name, or rain that is no known class.
     """
 
     def __init__(self, card: DataCard) -> None:
         self.card = card
         classes = {id_: name for id_, name in card.classes.items() if id_ not in card.unknown}
-        _check_classes(classes, card.rain)
         self.ids = np.array(sorted(classes), np.int64)
         self.names = [classes[id_] for id_ in self.ids.tolist()]
         self.is_rain = np.isin(self.ids, card.rain)
@@ -279,12 +275,3 @@ class RainCounts:
         false_negative, true_positive = cells[self.is_rain].sum(axis=(0, 1)).tolist()
         true_negative, false_positive = cells[~self.is_rain].sum(axis=(0, 1)).tolist()
         return Counts(true_positive, false_positive, false_negative, true_negative)
-
-
-def _check_classes(classes: Mapping[int, str], rain: Collection[int]) -> None:
-    if len(set(classes.values())) < len(classes):
-        raise InputError("classes", "two ids have the same name", "Give each a name of its own.")
-    if not set(rain) <= set(classes):
-        raise InputError(
-            "rain", f"{sorted(rain)} are not ids of classes", "Give ids that the classes name."
-        )

@@ -17,9 +17,6 @@ class RainMetrics(Metric):
 
     Args:
         card: Data card of the scans. Points of a class that it calls unknown are left out.
-
-    Raises:
-        InputError: Two classes of one name, or rain that is no known class.
     """
 
     full_state_update = False

@@ -130,6 +130,19 @@ def test_a_card_that_makes_no_sense_is_refused(card_file, key, value) -> None:
     assert len(str(refusal.value)) < len(str(card_file)) + 300
 
 
+@pytest.mark.parametrize(
+    ("classes", "ids", "named"),
+    [
+        ({0: "a", 1: "a"}, {"rain": (0,)}, "classes"),
+        ({0: "a"}, {"rain": (5,)}, "rain"),
+        ({0: "a"}, {"rain": (0,), "unknown": (0,)}, "unknown"),
+    ],
+)
+def test_a_card_made_in_python_is_checked_too(classes, ids, named) -> None:
+    with pytest.raises(InputError, match=f"^{named}: "):
+        DataCard("odd", classes, **ids)
+
+
 def test_an_unknown_name_is_answered_with_the_known_ones() -> None:
     with pytest.raises(InputError, match=r"rehearse: no such data card\. .*rehearse3d.*wads"):
         load_card("rehearse")

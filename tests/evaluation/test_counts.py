@@ -117,9 +117,6 @@ def test_what_cannot_be_counted_is_refused() -> None:
     with pytest.raises(InputError, match="id 9"):
         counts.add(scan.with_label(np.array([9])), np.array([True]))
     assert counts.per_scan == []
-    for classes, rain in (({0: "a", 1: "a"}, (0,)), ({0: "a"}, (5,))):
-        with pytest.raises(InputError):
-            RainCounts(DataCard("odd", classes, rain))
 
 
 def test_a_metric_counts_alike_in_any_precision_and_forgets_when_reset() -> None:
