@@ -29,12 +29,10 @@ class Extra:
     Attributes:
         name: Name of the smallest extra that installs the library.
         library: Name of the module that it installs.
-        also: Names of larger extras that install it, too.
     """
 
     name: str
     library: str
-    also: tuple[str, ...] = ()
 
     @property
     def installed(self) -> bool:
@@ -72,7 +70,7 @@ LIGHTNING = Extra("train", "lightning")
 TORCHMETRICS = Extra("train", "torchmetrics")
 JSONARGPARSE = Extra("train", "jsonargparse")
 TENSORBOARD = Extra("train", "tensorboard")
-MATPLOTLIB = Extra("view", "matplotlib", also=("train",))
+MATPLOTLIB = Extra("view", "matplotlib")
 ONNX = Extra("train", "onnx")
 ONNXSCRIPT = Extra("train", "onnxscript")
 OPTUNA = Extra("train", "optuna")
@@ -95,10 +93,11 @@ EXTRAS = (
     *(OPENVINO, ROSBAGS, MCAP, RERUN, DISTRIBUTED, FSSPEC),
 )
 
-# What is needed to read a checkpoint, to make an ONNX file of it, and to train it.
+# What is needed to read a checkpoint, to make an ONNX file of it, and to train it. Their extra also
+# installs matplotlib.
 CHECKPOINT_LIBRARIES = (TORCH, LIGHTNING, TORCHMETRICS)
 EXPORT_LIBRARIES = (*CHECKPOINT_LIBRARIES, ONNX, ONNXSCRIPT)
-TRAINING_LIBRARIES = (*CHECKPOINT_LIBRARIES, JSONARGPARSE, TENSORBOARD, MATPLOTLIB)
+TRAINING_LIBRARIES = (*CHECKPOINT_LIBRARIES, JSONARGPARSE, TENSORBOARD)
 
 
 def require(subject: str | Path, *extras: Extra) -> None:
@@ -126,13 +125,11 @@ def missing_extra(subject: str | Path, error: ModuleNotFoundError) -> MissingExt
 def _missing(subject: str | Path, extras: Sequence[Extra]) -> MissingExtraError:
     *others, last = [extra.library for extra in extras]
     libraries = f"{', '.join(others)} and {last}" if others else last
-    names = {extra.name for extra in extras}
-    # Without those that a larger one includes.
-    fewest = dict.fromkeys(extra.name for extra in extras if names.isdisjoint(extra.also))
+    names = dict.fromkeys(extra.name for extra in extras)
     error = MissingExtraError(
         subject,
         f"needs {libraries}, which {'are' if others else 'is'} not installed",
-        f"pip install 'derain[{','.join(fewest)}]'",
+        f"pip install 'derain[{','.join(names)}]'",
     )
     error.name = extras[0].library
     return error

@@ -37,8 +37,12 @@ def test_a_library_is_in_the_extra_that_is_named_for_it() -> None:
     distributions = importlib.metadata.packages_distributions()
     for extra in EXTRAS:
         providers = {each.lower() for each in distributions.get(extra.library, [extra.library])}
-        for name in (extra.name, *extra.also):
-            assert providers & requirements(PROJECT["optional-dependencies"][name]), extra.library
+        required = requirements(PROJECT["optional-dependencies"][extra.name])
+        assert providers & required, extra.library
+
+
+def test_what_training_draws_with_comes_with_its_extra() -> None:
+    assert MATPLOTLIB.library in requirements(PROJECT["optional-dependencies"][TORCH.name])
 
 
 def test_plain_derain_brings_no_library_of_an_extra() -> None:
@@ -59,7 +63,6 @@ def requirements(lines: list[str]) -> set[str]:
         *(([extra], f"{extra.library}, which is not", extra.name) for extra in EXTRAS),
         ([TORCH, ONNX, OPEN3D, TORCH], "torch, onnx and open3d, which are not", "train,scene"),
         ([OPEN3D, MATPLOTLIB], "open3d and matplotlib, which are not", "scene,view"),
-        ([MATPLOTLIB, TORCH], "matplotlib and torch, which are not", "train"),
     ],
 )
 def test_what_is_missing_is_named_with_the_smallest_extras_that_bring_it(
