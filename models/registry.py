@@ -9,6 +9,4 @@ if TYPE_CHECKING:
 
 # A file of derain/models enters its network by a decorator, `@NETWORKS.add("outdet")`. A package
 # outside derain does the same, and names its module under the entry points `derain.networks`.
-NETWORKS: "Registry[type[DerainingModule]]" = Registry(
-    "derain.models", group="derain.networks", attribute="NAME"
-)
+NETWORKS: "Registry[type[DerainingModule]]" = Registry("derain.models", "derain.networks")

@@ -94,7 +94,8 @@ class PointFilter(ABC):
     @property
     def name(self) -> str:
         """The registered name of the filter; if there is none, the name of its class."""
-        return FILTERS.name_of(type(self)) or type(self).__name__.lower()
+        name: str = vars(type(self)).get("NAME", type(self).__name__.lower())
+        return name
 
     @abstractmethod
     def judge(self, view: Neighbourhoods) -> Bools:

@@ -14,7 +14,7 @@ Made = TypeVar("Made")
 
 
 class Registry(Mapping[str, Kind], Generic[Kind]):
-    """Members of one kind: those in the modules of a package, and those of other packages.
+    """Classes of one kind: those in the modules of a package, and those of other packages.
 
     A module adds a member by a decorator::
 
@@ -29,20 +29,16 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
 
     That module is imported when derain's own modules do not have a name, or when the names are
     listed. One that cannot be imported causes a warning; the others stay usable.
-    The names are in alphabetical order.
+    The names are in alphabetical order. The first name of a member is its attribute ``NAME``.
 
     Args:
         package: Package whose modules add members, such as ``derain.filters``.
         group: Name of the entry points of other packages; by default the package's.
-        attribute: Attribute of a member that is set to the first of its names; by default none.
     """
 
-    def __init__(
-        self, package: str, group: str | None = None, attribute: str | None = None
-    ) -> None:
+    def __init__(self, package: str, group: str | None = None) -> None:
         self.package = package
         self.group = group or package
-        self.attribute = attribute
         self._members: dict[str, Kind] = {}
         self._has_own = False
         self._has_others = False
@@ -65,15 +61,10 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
                     )
             # Members of a module that was imported again replace the former ones.
             self._members.update(dict.fromkeys(names, cast(Kind, member)))
-            if self.attribute:
-                setattr(member, self.attribute, names[0])
+            member.NAME = names[0]  # type: ignore[attr-defined]
             return member
 
         return added
-
-    def name_of(self, member: object) -> str | None:
-        """First name of a member; None for anything else."""
-        return next((name for name, added in self._members.items() if added is member), None)
 
     def __getitem__(self, name: str) -> Kind:
         # Other packages come last: to look for them takes longer than to import derain's modules.
@@ -143,7 +134,6 @@ def from_parameters(kind: Callable[..., Made], name: str, parameters: Mapping[st
     return kind(**parameters)
 
 
-def _origin(member: object) -> str:
+def _origin(member: Any) -> str:
     """The module and name of a member, which stay the same when its module is imported again."""
-    name = getattr(member, "__qualname__", None)
-    return repr(member) if name is None else f"{member.__module__}.{name}"
+    return f"{member.__module__}.{member.__qualname__}"

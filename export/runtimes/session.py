@@ -12,9 +12,7 @@ from derain.scan import Array, Float32s
 from derain.system.registry import Registry
 
 # Those of this folder, and those that other packages bring.
-RUNTIMES: Registry[type["Session"]] = Registry(
-    "derain.export.runtimes", group="derain.runtimes", attribute="NAME"
-)
+RUNTIMES: Registry[type["Session"]] = Registry("derain.export.runtimes", "derain.runtimes")
 
 DEFAULT_RUNTIME, FLOAT32_PRECISION = "onnxruntime", "float32"
 
