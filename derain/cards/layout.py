@@ -42,17 +42,13 @@ class Layout:
 
     def label_of(self, scan: Path) -> Path:
         """Path of the labels of a scan in the folder of scans."""
-        return folder_above(folder_above(scan)) / self.labels / f"{scan_stem(scan)}{LABEL}"
+        beside = scan.parent / os.pardir / self.labels / f"{scan_stem(scan)}{LABEL}"
+        return Path(os.path.normpath(beside))
 
 
 def sequence_of(scan: Path) -> str:
     """Name of the sequence that a scan lies in: ``<sequence>/<folder of scans>/<frame>.bin``."""
     return scan.absolute().parent.parent.name
-
-
-def folder_above(path: Path) -> Path:
-    """The folder that a file or folder lies in, also where it is named from within its own."""
-    return path.parent if path.name not in ("", "..") else Path(os.path.abspath(path)).parent
 
 
 def _folder(entry: Entry) -> str:

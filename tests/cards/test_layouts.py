@@ -6,7 +6,7 @@ import pytest
 
 from derain.cards.card import load_card, packaged_cards
 from derain.cards.known import card_by_folders, known_layouts, label_of, label_places, lidar_folders
-from derain.cards.layout import Layout, folder_above, sequence_of
+from derain.cards.layout import Layout, sequence_of
 from derain.errors import InputError
 
 REHEARSE3D = Layout(scans="lidar_radar_pcd", labels="lidar_radar_labels", lidar="innoviz")
@@ -56,12 +56,13 @@ def test_labels_beside_a_scan_go_before_those_in_a_folder(tmp_path) -> None:
     assert label_of(tmp_path / "3.bin") == tmp_path / "3.label"
 
 
-def test_the_folder_above_is_found_from_within(tmp_path, monkeypatch) -> None:
+def test_labels_and_sequence_are_found_from_within_the_folder_of_scans(
+    tmp_path, monkeypatch
+) -> None:
     (tmp_path / "a/b").mkdir(parents=True)
     monkeypatch.chdir(tmp_path / "a/b")
-    assert folder_above(Path()) == tmp_path / "a"
-    assert folder_above(Path("..")) == tmp_path
-    assert folder_above(Path("scan.bin")) == Path()
-    assert folder_above(folder_above(Path("scan.bin"))) == tmp_path / "a"
-    assert folder_above(tmp_path / "a") == tmp_path
+    for scan in ("scan.bin", "../b/scan.bin", "./scan.bin"):
+        found = Layout().label_of(Path(scan))
+        assert found.absolute().resolve() == tmp_path / "a/labels/scan.label"
+    assert Layout().label_of(Path("b/scan.bin")) == Path("labels/scan.label")
     assert sequence_of(Path("scan.bin")) == "a"
