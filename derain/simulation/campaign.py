@@ -5,19 +5,19 @@ from abc import ABC, abstractmethod
 from dataclasses import asdict, dataclass, field, replace
 from itertools import cycle, islice
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 
 from derain import __version__
 from derain.errors import InputError
-from derain.files.documents import shown
 from derain.scan import Floats
 from derain.simulation.layouts import LAYOUTS
 from derain.simulation.manifest import MAKER, RAIN_RATE, SPLIT_PARTS
 from derain.simulation.radar import Radar
 from derain.simulation.rain_field import UniformRain
 from derain.simulation.sensor import Sensor, load_sensor
+from derain.simulation.settings import Settings, Within
 
 # Two of five sequences are clean, as are 39 % of REHEARSE-3D's. How often each rain rate occurs in
 # it is not published. The first sequence has rain, because it may be the only one to train on.
@@ -44,7 +44,7 @@ LONGEST = 2000.0
 
 
 @dataclass(frozen=True)
-class Drive:
+class Drive(Settings):
     """A drive along a street, or a sensor at rest in it while others move.
 
     Attributes:
@@ -55,41 +55,21 @@ class Drive:
             the scan, as after a perfect correction.
 
     Raises:
-        InputError: A speed or a number that is impossible, or skew where nothing moves.
+        InputError: A speed or a number that is impossible.
     """
 
-    speed: float = 0.0
-    traffic: int = 0
+    SUBJECT = "drive"
+    speed: Annotated[float, Within(0, FASTEST)] = 0.0
+    traffic: Annotated[int, Within(0, MOST_TRAFFIC)] = 0
     skew: bool = False
 
-    def __post_init__(self) -> None:
-        if not 0 <= self.speed <= FASTEST:
-            reason = f"{shown(self.speed)} m/s is impossible"
-            raise InputError("speed", reason, f"Give 0 (stands) to {FASTEST:g}.")
-        if not 0 <= self.traffic <= MOST_TRAFFIC:
-            reason = f"{shown(self.traffic)} is impossible"
-            raise InputError("traffic", reason, f"Give 0 to {MOST_TRAFFIC}.")
-        if self.skew and not (self.speed or self.traffic):
-            reason = "there is none where nothing moves"
-            raise InputError("skew", reason, "Give a speed or traffic.")
 
-    def length(self, duration: float) -> float:
-        """Length of the drive in metres.
-
-        Args:
-            duration: Duration, seconds.
-
-        Raises:
-            InputError: Too long a drive.
-        """
-        length = self.speed * duration
-        if length > LONGEST:
-            reason = f"{length:,.0f} m of street are more than {LONGEST:,.0f}"
-            raise InputError("drive", reason, "Simulate more sequences of fewer scans.")
-        return length
+# Numbers of sequences and of scans: at least one, or also none.
+AtLeastOne = Annotated[int, Within(1, MOST)]
+Count = Annotated[int, Within(0, MOST)]
 
 
-class SplitSequences(ABC):
+class SplitSequences(Settings, ABC):
     """A data set of sequences that are drawn by their numbers and split into three parts.
 
     Attributes:
@@ -100,17 +80,11 @@ class SplitSequences(ABC):
         DIGITS: Of the name of a sequence.
     """
 
-    train: int
-    validation: int
-    test: int
-    seed: int
     DIGITS: ClassVar[int]
-
-    def __post_init__(self) -> None:
-        for part in SPLIT_PARTS:
-            _check_count(part, getattr(self, part), int(part == "train"))
-        if self.seed < 0:
-            raise InputError("seed", f"{shown(self.seed)} is negative", "Give 0 or more.")
+    train: AtLeastOne
+    validation: Count
+    test: Count
+    seed: int
 
     @property
     def names(self) -> list[str]:
@@ -125,9 +99,19 @@ class SplitSequences(ABC):
         return {part: list(islice(names, getattr(self, part))) for part in SPLIT_PARTS}
 
     @property
-    @abstractmethod
     def description(self) -> dict[str, Any]:
-        """Everything that the files depend on, as reading it back from JSON gives it."""
+        """Everything that the files depend on, as reading it back from JSON gives it.
+
+        Raises:
+            InputError: A file that is missing or damaged.
+        """
+        content = {
+            "made_by": MAKER,
+            "version": __version__,
+            self.SUBJECT: asdict(self.resolved()),
+            "split": self.split,
+        }
+        return dict(json.loads(json.dumps(content)))
 
     @abstractmethod
     def resolved(self) -> Self:
@@ -148,17 +132,6 @@ class SplitSequences(ABC):
         Raises:
             InputError: A file cannot be written, or Open3D cannot be imported.
         """
-
-    def _described(self, **content: Any) -> dict[str, Any]:
-        """A description, as reading it back from JSON gives it."""
-        content = {"made_by": MAKER, "version": __version__, **content}
-        return dict(json.loads(json.dumps(content)))
-
-
-def _check_count(name: str, count: int, least: int) -> None:
-    if not least <= count <= MOST:
-        amount = "few" if count < least else "many"
-        raise InputError(name, f"{shown(count)} is too {amount}", f"Give {least} to {MOST:,}.")
 
 
 @dataclass(frozen=True)
@@ -184,23 +157,21 @@ class Campaign(SplitSequences):
             street or with a radar.
     """
 
-    train: int = 16
-    validation: int = 4
-    test: int = 8
-    scans: int = 3
-    rain_rates: tuple[float, ...] = (0.0, 10.0, 25.0, 50.0)
+    train: AtLeastOne = 16
+    validation: Count = 4
+    test: Count = 8
+    scans: AtLeastOne = 3
+    rain_rates: Annotated[tuple[float, ...], bool] = (0.0, 10.0, 25.0, 50.0)
     seed: int = 0
     sensor: Sensor | str = field(default_factory=Sensor)
     layout: str = "street"
     radar: Radar | None = None
     drive: Drive | None = None
+    SUBJECT = "campaign"
     DIGITS = 3
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_count("scans", self.scans, 1)
-        if not self.rain_rates:
-            raise InputError("rain rate", "none is given", "Give one or more, in mm/h.")
         for rate in self.rain_rates:
             UniformRain(rate)
         if self.layout not in LAYOUTS:
@@ -208,11 +179,10 @@ class Campaign(SplitSequences):
             raise InputError("layout", f"'{self.layout}' is unknown", f"Take one of {known}.")
         if self.drive is None:
             return
-        if self.layout != "street":
-            raise InputError("drive", f"a {self.layout} has none", "Take the layout street.")
-        if self.radar is not None:
-            raise InputError("drive", "has no radar", "Leave the radar out.")
-        self.drive.length(self.times[-1])
+        length = self.drive.speed * self.times[-1]
+        if self.layout != "street" or self.radar is not None or length > LONGEST:
+            reason = f"needs the layout street, no radar, and {LONGEST:,.0f} m or less"
+            raise InputError("drive", reason, "Change what differs.")
 
     @property
     def lidar(self) -> Sensor:
@@ -257,9 +227,8 @@ class Campaign(SplitSequences):
 
     @property
     def description(self) -> dict[str, Any]:
-        """Everything that the files depend on, as reading it back from JSON gives it."""
-        campaign = asdict(replace(self, sensor=self.lidar))
-        return self._described(campaign=campaign, split=self.split) | {RAIN_RATE: self.rain_rate}
+        """As of every campaign, with the rain rate of each sequence."""
+        return super().description | {RAIN_RATE: self.rain_rate}
 
 
 def partition(sequences: int) -> tuple[int, int, int]:

@@ -11,7 +11,7 @@ from numpy.random import Generator
 from derain.simulation.defects import Defects
 from derain.simulation.drawing import Span, log_uniform, pick
 from derain.simulation.sensor import MOST_BEAMS, ReturnMode, Sensor
-from derain.simulation.settings import LogSpan, Positive, Settings, Share, weights_of
+from derain.simulation.settings import LogSpan, Positive, Settings, Share, Within, weights_of
 from derain.views.spherical_grid import ALL_AROUND, FULL_CIRCLE
 
 # Numbers of rows, at least one. Sensors of today have at most 256.
@@ -125,7 +125,7 @@ class SensorSpans(Spans):
     rosette_width: Span = (38.0, 75.0)
     rosette_beams: LogSpan = (10_000.0, 60_000.0)
     prism_turns: LogSpan = (8.0, 40.0)
-    most_beams: Annotated[int, lambda count: 1 <= count <= MOST_BEAMS] = 150_000
+    most_beams: Annotated[int, Within(1, MOST_BEAMS)] = 150_000
     returns: Mapping[str, float] = field(
         default_factory=lambda: {"strongest": 0.6, "last": 0.1, "dual": 0.3}
     )

@@ -3,12 +3,13 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from derain.errors import InputError
 from derain.scan import Floats
+from derain.simulation.settings import Settings, Within
 
 # The facility's supply of water limits the product of rain rate and length of wet track, mm/h · m,
 # and its sprinklers limit that length, metres: it rains 10, 25 and 50 mm/h over 112, 56 and 28 m.
@@ -47,6 +48,7 @@ TIME_IN_WIND = 1.0
 
 # The hardest rain on record fell at 1,900 mm/h, for a minute.
 HARDEST_RAIN = 2000.0
+RainRate = Annotated[float, Within(0, HARDEST_RAIN)]
 
 # The greatest rate is looked for on a grid of this spacing, metres, and multiplied by a factor in
 # case it is greater between the points of the grid.
@@ -55,7 +57,7 @@ BETWEEN_STEPS = 1.01
 
 
 @dataclass(frozen=True)
-class UniformRain:
+class UniformRain(Settings):
     """Rain that is the same everywhere.
 
     Attributes:
@@ -65,11 +67,8 @@ class UniformRain:
         InputError: A rate below 0 or above HARDEST_RAIN.
     """
 
-    nominal: float
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.nominal <= HARDEST_RAIN:
-            raise _unknown_rate_error(self.nominal)
+    SUBJECT = "rain"
+    nominal: RainRate
 
     @property
     def heaviest(self) -> float:
@@ -82,7 +81,7 @@ class UniformRain:
 
 
 @dataclass(frozen=True)
-class SprinkledRain:
+class SprinkledRain(Settings):
     """Rain from two rows of sprinklers along x, as in the facility of REHEARSE-3D.
 
     Within 3 m of the axis it is 0.8 to 1.4 times the nominal rate up to 80 m at 10 mm/h, 40 m at
@@ -99,14 +98,9 @@ class SprinkledRain:
     Source: REHEARSE-3D, Figure 4.
     """
 
-    nominal: float
-    wind: tuple[float, float] = (0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        if not 0 < self.nominal <= HARDEST_RAIN:
-            raise _unknown_rate_error(self.nominal)
-        if not all(map(math.isfinite, self.wind)):
-            raise InputError("wind", f"{self.wind} m/s is no wind", "Give two finite numbers.")
+    SUBJECT = "rain"
+    nominal: Annotated[float, lambda rate: 0 < rate <= HARDEST_RAIN]
+    wind: Annotated[tuple[float, float], lambda wind: all(map(math.isfinite, wind))] = (0.0, 0.0)
 
     @property
     def span(self) -> float:
@@ -148,11 +142,6 @@ class SprinkledRain:
 
 # A rain rate over the ground.
 RainField = UniformRain | SprinkledRain
-
-
-def _unknown_rate_error(rate: float) -> InputError:
-    reason = f"{rate} mm/h is no rain rate"
-    return InputError("rain rate", reason, f"Give up to {HARDEST_RAIN:g} mm/h.")
 
 
 # Drop-size distribution N(D) = INTERCEPT · exp(−slope · D), in m⁻³ mm⁻¹.

@@ -59,7 +59,7 @@ class SimulatedScene:
         if campaign.drive is None:
             return cls(LAYOUTS[campaign.layout](generator), rain, weather)
         drive, times = campaign.drive, campaign.times
-        street = Street.draw(drive.length(times[-1]), generator)
+        street = Street.draw(drive.speed * times[-1], generator)
         course = Course.draw(drive.speed, generator)
         traffic = draw_traffic(drive.traffic, street, drive.speed, times, generator)
         track = Track.of(lay_out_street(street, generator))

@@ -17,9 +17,21 @@ Parser = Callable[[Entry], Any]
 MOST = 2**31
 
 
+@dataclass(frozen=True)
+class Within:
+    """The rule of numbers from ``least`` to ``most``."""
+
+    least: float
+    most: float
+
+    def __call__(self, value: float) -> bool:
+        """True for such a number."""
+        return self.least <= value <= self.most
+
+
 # Types of settings, each with the rule that its values follow: shares, finite numbers above 0, and
 # spans above 0, from which a number can be drawn evenly in its logarithm.
-Share = Annotated[float, lambda value: 0 <= value <= 1]
+Share = Annotated[float, Within(0, 1)]
 Positive = Annotated[float, lambda value: 0 < value < math.inf]
 LogSpan = Annotated[Span, lambda span: 0 < span[0] <= span[1] < math.inf]
 
@@ -50,7 +62,12 @@ class Settings:
             value = getattr(self, one.name)
             if not special.get(one.name, _is_possible(value, one.type)):
                 reason = f"{shown(value)} is impossible"
-                raise InputError(f"{self.SUBJECT}: {one.name}", reason, "Correct it.")
+                match get_args(one.type):
+                    case (_, Within(least, most)):
+                        remedy = f"Give {least:,.7g} to {most:,.7g}."
+                    case _:
+                        remedy = "Correct it."
+                raise InputError(f"{self.SUBJECT}: {one.name}", reason, remedy)
 
     def _possible(self) -> Mapping[str, bool]:
         """Validity of attributes, by name, for conditions beyond their types."""

@@ -16,7 +16,7 @@ from derain.files.atomic import write_text
 from derain.files.documents import Entry, packaged, packaged_or_own
 from derain.files.labels import write_labels
 from derain.scan import Scan
-from derain.simulation.campaign import SplitSequences
+from derain.simulation.campaign import AtLeastOne, Count, SplitSequences
 from derain.simulation.classes import TrackClass, unpacked
 from derain.simulation.drawing import pick
 from derain.simulation.drawn_sensor import SensorSpans, draw_sensor
@@ -134,11 +134,12 @@ class WorldCampaign(SplitSequences):
         InputError: Too few or too many scans, or a negative seed.
     """
 
-    train: int = 1000
-    validation: int = 100
-    test: int = 0
+    train: AtLeastOne = 1000
+    validation: Count = 100
+    test: Count = 0
     seed: int = 0
     world: World | str = field(default_factory=World)
+    SUBJECT = "worlds"
     DIGITS = 5
 
     def resolved(self) -> Self:
@@ -149,11 +150,6 @@ class WorldCampaign(SplitSequences):
         """
         world = load_world(self.world) if isinstance(self.world, str) else self.world
         return replace(self, world=world)
-
-    @property
-    def description(self) -> dict[str, Any]:
-        """Everything that the files depend on, as reading it back from JSON gives it."""
-        return self._described(worlds=asdict(self), split=self.split)
 
     def write(self, folder: Path, name: str) -> None:
         """Simulates a sequence: one scan, its labels, and what it was drawn as.

@@ -119,10 +119,13 @@ def test_columns_and_a_picture(succeed, tmp_path, saved_figures) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--speed", "13"], "drive: a facility has none. Take the layout street."),
-        (["--speed", "13", "--layout", "street", "--radar"], "drive: has no radar"),
+        (["--speed", "13"], "drive: needs the layout street, no radar"),
+        (
+            ["--speed", "13", "--layout", "street", "--radar"],
+            "drive: needs the layout street, no radar",
+        ),
         (["--speed", "13", "--on", "."], "--speed: works only without --on"),
-        (["--rain", "-1"], "rain rate: -1.0 mm/h is no rain rate. Give up to 2000 mm/h."),
+        (["--rain", "-1"], "rain: nominal: -1.0 is impossible. Give 0 to 2,000."),
         (["--rain", "nan"], "--rain: nan is not a number."),
         (["--seed", "-1"], "--seed: -1 is less than 0"),
         (["--sensor", "mars"], "mars: no such sensor. Give a YAML file or one of front_128,"),
