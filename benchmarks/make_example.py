@@ -13,7 +13,7 @@ from derain.files import write_scan
 from derain.files.labels import write_labels
 from derain.simulation.classes import unpacked
 from derain.simulation.drawn_sensor import SensorSpans
-from derain.simulation.flying.precipitation import KINDS, PrecipitationSpans
+from derain.simulation.flying.precipitation import KINDS
 from derain.simulation.world import World, draw_scan
 
 # A sensor that looks ahead, of 64 rows of 330 steps.
@@ -36,7 +36,7 @@ def main() -> None:
     out: Path = parser.parse_args().out
     folders = load_card("simulated").layout
     for kind in ("rain", "snow"):
-        weather = PrecipitationSpans(((kind, KINDS[kind]),))
+        weather = {kind: KINDS[kind]}
         world = World(places={"street": 1.0}, carrier=0.0, sensors=SENSOR, precipitation=weather)
         scan, _ = draw_scan(world, np.random.default_rng(SEED))
         assert scan.label is not None  # a simulated scan is labelled

@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 import yaml
@@ -21,7 +21,7 @@ from derain.simulation.classes import TrackClass, unpacked
 from derain.simulation.drawing import pick
 from derain.simulation.drawn_sensor import SensorSpans, draw_sensor
 from derain.simulation.flying.meeting import meet
-from derain.simulation.flying.precipitation import PrecipitationSpans
+from derain.simulation.flying.precipitation import KINDS, Kind, draw_precipitation, kinds_of
 from derain.simulation.layouts import INDOORS, LAYOUTS
 from derain.simulation.places.carrier import lay_out_carrier
 from derain.simulation.places.horizon import lay_out_horizon
@@ -40,6 +40,8 @@ SMALLEST_SCAN = 1000
 LARGEST_SHARE_OF_RAIN = 0.4
 MOST_TRIES = 100
 
+Kinds = Annotated[Mapping[str, Kind], lambda kinds: any(kind.weight for kind in kinds.values())]
+
 
 @dataclass(frozen=True)
 class World(Settings):
@@ -50,7 +52,8 @@ class World(Settings):
         horizon: Share of the places outdoors that go on to where only few beams reach.
         carrier: Share of the sensors that see what carries them.
         sensors: Ranges of sensors.
-        precipitation: Ranges of precipitation.
+        precipitation: Kinds of precipitation by name, one of them with a weight; the default is all
+            of KINDS.
 
     Raises:
         InputError: No weight above 0, or a share outside 0 to 1.
@@ -61,8 +64,8 @@ class World(Settings):
     horizon: Share = 0.7
     carrier: Share = 1.0
     sensors: SensorSpans = field(default_factory=SensorSpans)
-    precipitation: PrecipitationSpans = field(default_factory=PrecipitationSpans)
-    READ_BY: ClassVar = {"places": weights_of(*LAYOUTS)}
+    precipitation: Kinds = field(default_factory=KINDS.copy)
+    READ_BY: ClassVar = {"places": weights_of(*LAYOUTS), "precipitation": kinds_of}
 
 
 def packaged_worlds() -> dict[str, Path]:
@@ -100,7 +103,7 @@ def draw_scan(world: World, generator: Generator) -> tuple[Scan, dict[str, Any]]
         sensor = draw_sensor(world.sensors, generator)
         place = pick(world.places, generator)
         track = _lay_out(place, world, sensor, generator)
-        precipitation = world.precipitation.draw(generator)
+        precipitation = draw_precipitation(world.precipitation, generator)
         detected = meet(track.cast(sensor), sensor.beams(), precipitation, sensor, generator)
         scan = sensor.measure(detected, generator)
         rain = scan.label == TrackClass.RAIN

@@ -17,7 +17,7 @@ from derain.simulation.world import World, WorldCampaign, draw_scan, load_world,
 def test_a_packaged_world_draws_from_places_and_kinds_that_there_are(name) -> None:
     world = load_world(name)
     assert world.places.keys() == LAYOUTS.keys()
-    assert {name for name, _ in world.precipitation.kinds} >= {"none", "rain"}
+    assert world.precipitation.keys() >= {"none", "rain"}
 
 
 def test_a_scan_is_of_its_world(small_world) -> None:
@@ -59,6 +59,8 @@ def test_a_seed_gives_the_same_scans_however_many_there_are(small_world, tmp_pat
         (None, "empty"),
         ({"horizon": 2}, "horizon"),
         ({"precipitation": {"frogs": {}}}, "frogs"),
+        ({"precipitation": {"snow": {"weight": 0}}}, "precipitation: "),
+        ({"precipitation": {}}, "precipitation: "),
     ],
 )
 def test_a_world_that_cannot_be_is_refused(document, named) -> None:

@@ -1,13 +1,13 @@
 """The precipitation of a scan, and the kinds that it is drawn from."""
 
 import math
-from dataclasses import dataclass, field, fields
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.random import Generator
 
-from derain.errors import InputError
 from derain.files.documents import Entry, packaged
 from derain.simulation.drawing import Span, pick
 from derain.simulation.settings import Positive, Settings, Share
@@ -229,41 +229,20 @@ SPANS = {one.name: one.type for one in fields(Kind) if one.type in (Span, Decade
 KINDS = Entry.of_yaml(packaged("derain.simulation.flying")["kinds"]).each(Kind.of)
 
 
-@dataclass(frozen=True)
-class PrecipitationSpans:
-    """Kinds of precipitation, by name.
+def kinds_of(entry: Entry) -> dict[str, Kind]:
+    """Reads kinds from a document.
 
-    Attributes:
-        kinds: Their names and spans; the default is all of KINDS.
+    Args:
+        entry: Names of KINDS, and of each what differs from there, such as
+            ``snow: {weight: 2, number: [10, 100]}``. Kinds that are left out are never drawn.
 
     Raises:
-        InputError: No kind that has a weight.
+        InputError: No such kind or attribute, or a value that it cannot have.
     """
+    return entry.record({name: kind.changed for name, kind in KINDS.items()})
 
-    kinds: tuple[tuple[str, Kind], ...] = field(default=tuple(KINDS.items()))
 
-    def __post_init__(self) -> None:
-        if not any(kind.weight for _, kind in self.kinds):
-            raise InputError("precipitation", "no kind has a weight", "Give one kind a weight.")
-
-    @classmethod
-    def of(cls, entry: Entry) -> Self:
-        """Reads kinds from a document.
-
-        Args:
-            entry: Names of KINDS, and of each what differs from there, such as
-                ``snow: {weight: 2, number: [10, 100]}``. Kinds that are left out are never drawn.
-
-        Raises:
-            InputError: No such kind or attribute, or a value that it cannot have.
-        """
-        kinds = entry.record({name: kind.changed for name, kind in KINDS.items()})
-        try:
-            return cls(tuple(kinds.items()))
-        except InputError as error:
-            raise entry.fault(error.reason, error.remedy) from error
-
-    def draw(self, generator: Generator) -> Precipitation:
-        """Draws a kind of precipitation by the weights, and then its numbers from their spans."""
-        name, kind = pick({named: named[1].weight for named in self.kinds}, generator)
-        return kind.draw(name, generator)
+def draw_precipitation(kinds: Mapping[str, Kind], generator: Generator) -> Precipitation:
+    """Draws a kind of precipitation by the weights, and then its numbers from their spans."""
+    name = pick({name: kind.weight for name, kind in kinds.items()}, generator)
+    return kinds[name].draw(name, generator)
