@@ -123,10 +123,8 @@ def _begun(root: Path, description: Mapping[str, Any]) -> dict[str, Any]:
     """The manifest of a folder that holds part of this data set; empty for a new or empty one.
 
     Raises:
-        InputError: The folder holds something else, or cannot be made.
+        InputError: The folder holds something else, is a file, or cannot be made.
     """
-    if root.exists() and not root.is_dir():
-        raise InputError(root, "is not a folder", "Name a new or empty folder.")
     with writing(root):
         root.mkdir(parents=True, exist_ok=True)
     # Looked for before the manifest is read, which another run may be about to write.

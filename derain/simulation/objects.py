@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.random import Generator
 
-from derain.scan import Floats
+from derain.scan import Bools, Floats
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import Span, log_uniform, log_uniforms
@@ -42,6 +42,11 @@ class Surface:
     def moved(self, x: float, y: float, z: float) -> "Surface":
         """The same surface, moved by metres along the three axes."""
         return replace(self, triangles=self.triangles + np.array([x, y, z]))
+
+    def part(self, rows: Bools) -> "Surface":
+        """The same surface with some of its triangles, by a mask, bool (T,)."""
+        reflectivity = np.broadcast_to(self.reflectivity, len(rows))[rows]
+        return replace(self, triangles=self.triangles[rows], reflectivity=reflectivity)
 
     def sloped(self, ahead: float, left: float) -> "Surface":
         """The same surface, raised by a share of its x and of its y, as on sloping ground."""

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.random import Generator
 
-from derain.scan import Array, Floats
+from derain.scan import Array, Bools, Floats
 
 Triangles = Floats
 
@@ -184,15 +184,24 @@ def across(along: Floats) -> tuple[Floats, Floats]:
     return first.T, second.T
 
 
-def nearest_to_axis(triangles: Array) -> Floats:
-    """The x and y, (2, T), where each triangle, seen from above, is nearest to the z axis.
+def clear_of_axis(triangles: Array, clearance: float) -> Bools:
+    """True if a triangle, seen from above, is farther from the z axis than a clearance, bool (T,).
 
-    That is a corner or a place on an edge; that the axis goes through a triangle does not count.
+    Args:
+        triangles: Corners, (T, 3, 3), metres.
+        clearance: Metres.
     """
-    first = triangles[..., :2]
-    edge = np.roll(first, -1, axis=1) - first
+    level = triangles[..., :2]
+    lowest, greatest = level.min(axis=1), level.max(axis=1)
+    about = ((lowest < clearance) & (greatest > -clearance)).all(axis=1)
+    first = level[about]
+    second = np.roll(first, -1, axis=1)
+    edge = second - first
     length = np.maximum((edge * edge).sum(axis=-1), np.finfo(float).tiny)
     share = np.clip(-(first * edge).sum(axis=-1) / length, 0, 1)
-    places = first + share[..., None] * edge
-    nearest = (places * places).sum(axis=-1).argmin(axis=1)
-    return np.asarray(places[np.arange(len(places)), nearest].T)
+    x, y = np.moveaxis(first + share[..., None] * edge, -1, 0)
+    turn = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
+    around = (turn > 0).all(axis=1) | (turn < 0).all(axis=1)  # the axis goes through it
+    clear = ~about
+    clear[about] = (np.hypot(x, y) > clearance).all(axis=1) & ~around
+    return np.asarray(clear)

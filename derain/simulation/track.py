@@ -1,13 +1,14 @@
 """A test track of triangles, and its returns through clear air."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from derain.scan import Array, Float32s, Floats, Ints
+from derain.simulation.arrays import Columns
 from derain.simulation.classes import TrackClass
 from derain.simulation.objects import Surface
 from derain.simulation.sensor import Returns, Sensor
@@ -15,7 +16,7 @@ from derain.system.open3d_import import import_open3d
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class Track(Columns):
     """Everything on the track.
 
     Attributes:
@@ -23,14 +24,13 @@ class Track:
             the road under the sensor.
         reflectivity: Reflectivity of each triangle, float64 (T,), in 0..1.
         label: TrackClass of each triangle, int64 (T,).
-        roughness: Roughness of each triangle, float64 (T,), or of all of them, radians, see
-            :func:`backscatter`.
+        roughness: Roughness of each triangle, float64 (T,), radians, see :func:`backscatter`.
     """
 
     triangles: Float32s
     reflectivity: Floats
     label: Ints
-    roughness: Floats | float = 0.0
+    roughness: Floats
 
     @classmethod
     def of(cls, surfaces: Iterable[Surface]) -> "Track":
@@ -45,16 +45,13 @@ class Track:
             np.repeat([part.roughness for part in parts], counts),
         )
 
-    @classmethod
-    def joined(cls, tracks: Iterable["Track"]) -> "Track":
-        """Joins tracks into one, whose surfaces are all smooth."""
-        parts = [(track.triangles, track.reflectivity, track.label) for track in tracks]
-        return cls(*map(np.concatenate, zip(*parts, strict=True)))
-
     def with_surfaces(self, surfaces: Iterable[Surface]) -> "Track":
         """The track with surfaces added; every surface is then smooth."""
         added = list(surfaces)
-        return Track.joined([self, Track.of(added)]) if added else self
+        if not added:
+            return self
+        track = Track.joined([self, Track.of(added)])
+        return replace(track, roughness=np.zeros(len(track.label)))
 
     def cast(self, sensor: Sensor, pose: Floats | None = None) -> Returns:
         """The return of every beam of a sensor through clear air to a perfect detector.
@@ -84,8 +81,8 @@ class Track:
         reflectivity = np.zeros(len(beams))
         label = np.full(len(beams), TrackClass.BACKGROUND, dtype=np.int64)
         distance[hit] = hits["t_hit"][hit]
-        roughness = np.broadcast_to(self.roughness, len(self.triangles))[triangle]
-        reflectivity[hit] = self.reflectivity[triangle] * backscatter(cosine, roughness)
+        facing = backscatter(cosine, self.roughness[triangle])
+        reflectivity[hit] = self.reflectivity[triangle] * facing
         label[hit] = self.label[triangle]
         return Returns(distance, reflectivity, label, np.arange(len(beams)))
 

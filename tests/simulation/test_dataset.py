@@ -173,7 +173,7 @@ def test_what_others_made_or_cannot_be_is_left_alone(track, tmp_path) -> None:
     for root, campaign, reason in (
         (track, replace(TINY, seed=1), "other parameters"),
         (tmp_path, TINY, "something other"),
-        (tmp_path / "thesis.txt", TINY, "is not a folder"),
+        (tmp_path / "thesis.txt", TINY, r"thesis\.txt: cannot be written"),
         (tmp_path / "new", replace(TINY, sensor="mars"), "mars: no such sensor"),
     ):
         with pytest.raises(InputError, match=reason):

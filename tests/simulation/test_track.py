@@ -80,12 +80,21 @@ def test_sheets_have_the_area_of_their_outline_and_blades_half_of_length_by_widt
     assert area(blades) == pytest.approx(0.01 * np.linalg.norm(ends - starts, axis=1).sum())
 
 
-def test_the_nearest_places_to_the_axis_are_the_nearest_of_many_on_the_edges() -> None:
+def test_what_is_clear_of_the_axis_is_farther_from_it_everywhere() -> None:
     triangles = np.random.default_rng(0).uniform(-3, 3, (50, 3, 3))
     share = np.linspace(0, 1, 2001)[:, None, None, None]
     edges = (1 - share) * triangles + share * np.roll(triangles, -1, axis=1)
-    expected = np.hypot(edges[..., 0], edges[..., 1]).min(axis=(0, 2))
-    assert np.hypot(*shapes.nearest_to_axis(triangles)) == pytest.approx(expected, abs=2e-3)
+    nearest = np.hypot(edges[..., 0], edges[..., 1]).min(axis=(0, 2))
+    settled = np.abs(nearest - 0.5) > 2e-3
+    clear = shapes.clear_of_axis(triangles, 0.5)
+    # Only a triangle that the axis goes through is not clear of it though its edges are.
+    first, second = triangles[..., :2], np.roll(triangles, -1, axis=1)[..., :2]
+    turn = np.sign(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])
+    through = np.abs(turn.sum(axis=1)) == 3
+    assert (clear == (nearest > 0.5) & ~through)[settled].all()
+    overhead = np.array([[[2.0, 0, 1], [-2, 3, 1], [-2, -3, 1]]])
+    assert not shapes.clear_of_axis(np.concatenate([overhead, overhead[:, ::-1]]), 0.5).any()
+    assert shapes.clear_of_axis(shapes.placed(overhead, 5, 0), 2.9).all()
 
 
 SENSOR = Sensor(rows=16, columns=40)

@@ -141,8 +141,9 @@ def assemble(
         generator: Random generator.
         over: Objects above the sensor: a ceiling, cables.
     """
-    cleared = Track.joined([Track.of(ground), _cleared(Track.of(standing))])
-    track = cleared.with_surfaces(over)
+    things = Track.of(standing)
+    cleared = things.take(shapes.clear_of_axis(things.triangles, CLEARANCE))
+    track = Track.joined([Track.of(ground), cleared]).with_surfaces(over)
     corners = track.triangles.reshape(-1, 3).astype(np.float64)
     corners[:, 2] += relief(corners[:, 0], corners[:, 1])
     tilted = (corners @ _tilt(generator)).reshape(-1, 3, 3)
@@ -155,17 +156,6 @@ def _tilt(generator: Generator) -> Floats:
     turned = shapes.placed(axes, 0, 0, generator.uniform(-0.15, 0.15))
     tilted = shapes.sloped(turned, *generator.uniform(-0.02, 0.02, 2))
     return tilted[:, 0]
-
-
-def _cleared(track: Track) -> Track:
-    """A track without those of its triangles that are too near to the sensor's axis."""
-    level = track.triangles[..., :2]
-    lowest, greatest = level.min(axis=1), level.max(axis=1)
-    about = ((lowest < CLEARANCE) & (greatest > -CLEARANCE)).all(axis=1)
-    far = ~about
-    x, y = shapes.nearest_to_axis(track.triangles[about])
-    far[about] = np.hypot(x, y) > CLEARANCE
-    return Track(track.triangles[far], track.reflectivity[far], track.label[far])
 
 
 # How far from the sensor they are, metres.

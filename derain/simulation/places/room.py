@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.random import Generator
 
-from derain.scan import Bools
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import log_uniform
@@ -55,10 +54,7 @@ def lay_out_room(generator: Generator) -> Track:
 
 def _cleared(surface: Surface) -> Surface:
     """A surface without its parts too near to the sensor's axis."""
-    x, y = shapes.nearest_to_axis(surface.triangles)
-    far = (np.hypot(x, y) > ROOM_CLEARANCE) & ~_about_axis(surface.triangles)
-    reflectivity = np.broadcast_to(surface.reflectivity, len(far))[far]
-    return replace(surface, triangles=surface.triangles[far], reflectivity=reflectivity)
+    return surface.part(shapes.clear_of_axis(surface.triangles, ROOM_CLEARANCE))
 
 
 def _polished(surface: Surface, generator: Generator) -> Surfaces:
@@ -68,15 +64,6 @@ def _polished(surface: Surface, generator: Generator) -> Surfaces:
         return
     count = round(log_uniform(SPECKS_OF_A_THING, generator))
     yield from mirrored(surface, np.array([0, 0, np.mean(MOUNTING_HEIGHTS)]), count, generator)
-
-
-def _about_axis(triangles: shapes.Triangles) -> Bools:
-    """True if the z axis goes through a triangle, bool (T,)."""
-    first = triangles[..., :2]
-    second = np.roll(first, -1, axis=1)
-    turn = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
-    left, right = (turn > 0).all(axis=1), (turn < 0).all(axis=1)
-    return np.asarray(left | right)
 
 
 def _below_the_ceiling(room: Walls, generator: Generator) -> Surfaces:

@@ -59,8 +59,7 @@ def facade(length: float, generator: Generator) -> Surfaces:
     middle = wall.triangles.mean(axis=1)
     along, up = middle[:, 0] % bay - bay / 2, middle[:, 2] % storey - sill
     solid = (np.abs(along) > wide / 2) | (up < 0) | (up > high)
-    assert not isinstance(wall.reflectivity, float)
-    yield Surface(wall.triangles[solid], wall.label, wall.reflectivity[solid])
+    yield wall.part(solid)
     behind = shapes.box(length, 2.5, 0, height, at=(length / 2, 2.75))  # the rooms' far walls
     yield of_material([behind], STONE, generator)
     panes, frames = [], []
