@@ -14,7 +14,6 @@ from derain.recordings.placing import PlacedFrames, PlacedMethod
 from derain.recordings.rays import RayEvidence, Rays, mean_evidence, ray_evidence
 from derain.scan import Float32s, Floats, Ints, Scan
 from derain.sources.judgement import Judgement
-from derain.sources.recent_frames import FrameInWindow
 from derain.sources.window import Window, WindowOfScans
 from derain.system.stopwatch import Stopwatch
 from derain.views.morton import evenly
@@ -112,20 +111,18 @@ class RecordedDerainer(PlacedMethod):
         self._alone: dict[Scan, Judgement | None] = {}
         self._unlike: WeakSet[Scan] = WeakSet()
 
-    def _judged(self, ready: FrameInWindow, stopwatch: Stopwatch) -> Judgement:
-        scans = ready.scans
+    def _judged(self, scans: WindowOfScans, stopwatch: Stopwatch) -> Judgement:
+        scan = scans.judged.scan
         seen = [one.scan for one in (scans.judged, *scans.before, *scans.after)]
         # Of no scan that is not seen any more: each judgement holds its scan.
-        with ready.naming_errors():
-            self._alone = {scan: self._alone_of(scan, stopwatch) for scan in seen}
-            alone = self._alone[scans.scan]
-            if alone is None:
-                alone = self.model.judge_silently(scans.scan, stopwatch)  # which raises the reason
-        with ready.naming_errors(), stopwatch.stage("rays"):
+        self._alone = {one: self._alone_of(one, stopwatch) for one in seen}
+        alone = self._alone[scan]
+        if alone is None:
+            alone = self.model.judge_silently(scan, stopwatch)  # which raises the reason
+        with stopwatch.stage("rays"):
             probability = self._with_rays(alone, scans)
         rain = probability > self.model.spec.threshold
-        judgement = replace(alone, probability=probability, rain=rain, frame=ready.frame)
-        return self.with_warnings(judgement)
+        return replace(alone, probability=probability, rain=rain, frame=scans.judged.frame)
 
     def _with_rays(self, alone: Judgement, scans: WindowOfScans) -> Float32s:
         """Probabilities of rain by the model and by the rays of other scans, float32 (N,)."""

@@ -11,8 +11,8 @@ from derain.scan import Array, Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
-from derain.sources.recent_frames import FrameInWindow, RecentFrames
-from derain.sources.window import PlacedScan, Window
+from derain.sources.recent_frames import RecentFrames, ScanError
+from derain.sources.window import PlacedScan, Window, WindowOfScans
 from derain.system.stopwatch import Stopwatch
 from derain.views.scan_issues import ScanIssue
 
@@ -54,8 +54,7 @@ class Between(Method):
         assert isinstance(frame, Frame)
         assert not frame.has_labels
         with (stopwatch or Stopwatch()).stage("read"):
-            placed = PlacedScan(frame.read(), frame.pose)
-            ready = self._recent.push(frame, placed)
+            ready = self._recent.push(PlacedScan(frame, frame.read(), frame.pose))
         return None if ready is None else self._judged(ready)
 
     def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
@@ -70,13 +69,13 @@ class Between(Method):
     def as_dict(self) -> dict[str, Any]:
         return {"method": "between", **asdict(self.dimmer)}
 
-    def _judged(self, ready: FrameInWindow) -> Judgement:
-        scan = ready.scans.scan
+    def _judged(self, scans: WindowOfScans) -> Judgement:
+        frame, scan = scans.judged.frame, scans.judged.scan
         if scan.intensity is None:
-            with ready.naming_errors():
-                raise InputError(ready.frame.name, "it has no intensity", "Give another scan.")
-        self.poses.append(ready.scans.judged.pose)
+            error = InputError(frame.name, "it has no intensity", "Give another scan.")
+            raise ScanError(frame, error)
+        self.poses.append(scans.judged.pose)
         rain = scan.valid & (scan.intensity < self.dimmer.rain_below)
-        whole = bool(ready.scans.before and ready.scans.after)
+        whole = bool(scans.before and scans.after)
         known = (scan.range < self.dimmer.sure_within) & whole
-        return Judgement(rain.astype(np.float32), rain, scan.valid, scan, ready.frame, known)
+        return Judgement(rain.astype(np.float32), rain, scan.valid, scan, frame, known)

@@ -14,7 +14,6 @@ from derain.recordings.rays import RayEvidence, mean_evidence
 from derain.scan import Bools, Floats, Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
-from derain.sources.recent_frames import FrameInWindow
 from derain.sources.window import Window, WindowOfScans
 from derain.system.cores import threads_of
 from derain.system.stopwatch import Stopwatch
@@ -111,14 +110,14 @@ class PersistenceDerainer(PlacedMethod):
         self._recent = PlacedFrames(self.window, self.threads)
         self._points: WeakKeyDictionary[Scan, ScanPoints] = WeakKeyDictionary()
 
-    def _judged(self, ready: FrameInWindow, stopwatch: Stopwatch) -> Judgement:
-        scan, scans = ready.scans.scan, ready.scans
-        with ready.naming_errors(), stopwatch.stage("view"):
+    def _judged(self, scans: WindowOfScans, stopwatch: Stopwatch) -> Judgement:
+        frame, scan = scans.judged.frame, scans.judged.scan
+        with stopwatch.stage("view"):
             for one in (scans.judged, *scans.before, *scans.after):
                 if one.scan not in self._points:
                     self._points[one.scan] = ScanPoints(one.scan, self.threads)
         points = self._points[scan]
-        with ready.naming_errors(), stopwatch.stage("network"):
+        with stopwatch.stage("network"):
             evidence = self._evidence(scans)
             alone = combined_log_odds(points, evidence)
             agreed = vote(points, alone)
@@ -127,12 +126,11 @@ class PersistenceDerainer(PlacedMethod):
             surely_solid = (alone < -sure) & (agreed < -sure)
             known = (surely_rain | surely_solid) & (evidence is not None)
         with stopwatch.stage("back"):
-            judgement = _by_row(scan, points, agreed, known, ready.frame)
-        return self.with_warnings(judgement)
+            return _by_row(scan, points, agreed, known, frame)
 
     def _evidence(self, scans: WindowOfScans) -> RayEvidence | None:
         """The evidence of the rays of the other scans; None without any."""
-        points, found = self._points[scans.scan], []
+        points, found = self._points[scans.judged.scan], []
         for other in (*scans.before, *scans.after):
             transform = scans.judged.to(other)
             if transform is not None and len(self._points[other.scan]):

@@ -2,17 +2,19 @@
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import ClassVar
 from weakref import WeakKeyDictionary
 
 from derain.errors import InputError
+from derain.files.reading import reading
 from derain.recordings.odometry import FrameOdometry
 from derain.scan import Array, Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
-from derain.sources.recent_frames import FrameInWindow, RecentFrames
-from derain.sources.window import PlacedScan, Window
+from derain.sources.recent_frames import RecentFrames, ScanError
+from derain.sources.window import PlacedScan, Window, WindowOfScans
 from derain.system.stopwatch import Stopwatch
 from derain.views.scan_issues import ScanIssue
 
@@ -41,7 +43,7 @@ class PlacedFrames(RecentFrames):
         self._stretch = 0
         self._has_poses: bool | None = None  # whether the last frame had a pose; None before any
 
-    def place(self, frame: Frame | Scan | Array, stopwatch: Stopwatch) -> FrameInWindow | None:
+    def place(self, frame: Frame | Scan | Array, stopwatch: Stopwatch) -> WindowOfScans | None:
         """Reads and places the next frame; a new recording drops those still waiting.
 
         Args:
@@ -60,7 +62,7 @@ class PlacedFrames(RecentFrames):
             scan = frame.read()  # an object of its own, even of a scan that is pushed again
         with stopwatch.stage("odometry"):
             placed = self._placed(frame, scan)
-        return self.push(frame, placed)
+        return self.push(placed)
 
     def damage(self, scan: Scan) -> Iterator[ScanIssue]:
         """The error of a damaged record of a scan's pose."""
@@ -83,7 +85,7 @@ class PlacedFrames(RecentFrames):
             self._stretch += not registration.trusted
             pose = registration.pose
         self.doubts[scan] = doubts
-        return PlacedScan(scan, pose, self._stretch)
+        return PlacedScan(frame, scan, pose, self._stretch)
 
 
 class PlacedMethod(Method):
@@ -115,7 +117,7 @@ class PlacedMethod(Method):
         """
         stopwatch = stopwatch or Stopwatch()
         ready = self._recent.place(frame, stopwatch)
-        return None if ready is None else self._judged(ready, stopwatch)
+        return None if ready is None else self._answer(ready, stopwatch)
 
     def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
         """Ends a recording: answers for the frames that still wait, with the scans that there are.
@@ -127,11 +129,24 @@ class PlacedMethod(Method):
             InputError: A frame that cannot be judged.
         """
         while self.waiting:
-            yield self._judged(self._recent.pop(), stopwatch or Stopwatch())
+            yield self._answer(self._recent.pop(), stopwatch or Stopwatch())
         self._end_recording()
 
+    def _answer(self, scans: WindowOfScans, stopwatch: Stopwatch) -> Judgement:
+        """Judges a frame that has its window, and warns of its issues.
+
+        Raises:
+            ScanError: It cannot be judged, for instance because the memory is full.
+        """
+        frame = scans.judged.frame
+        try:
+            with reading(Path(frame.name)):
+                return self.with_warnings(self._judged(scans, stopwatch))
+        except InputError as error:
+            raise ScanError(frame, error) from error
+
     @abstractmethod
-    def _judged(self, ready: FrameInWindow, stopwatch: Stopwatch) -> Judgement:
+    def _judged(self, scans: WindowOfScans, stopwatch: Stopwatch) -> Judgement:
         """Judges a frame that has its window."""
 
     @abstractmethod

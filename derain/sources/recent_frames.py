@@ -1,42 +1,12 @@
 """The frames of a recording that a window needs, kept as they come in."""
 
 from collections import deque
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 from derain.errors import InputError
-from derain.files.reading import reading
 from derain.scan import Scan
 from derain.sources.frame import Frame, MemoryFrame
 from derain.sources.window import PlacedScan, Window, WindowOfScans
-
-
-@dataclass(frozen=True, eq=False)
-class FrameInWindow:
-    """A frame that can be judged, with those around it.
-
-    Attributes:
-        frame: The frame.
-        scans: Its scan, and those before and after it.
-    """
-
-    frame: Frame
-    scans: WindowOfScans
-
-    @contextmanager
-    def naming_errors(self) -> Iterator[None]:
-        """Has the errors of the block, which judges it, name the frame.
-
-        Raises:
-            ScanError: In place of another InputError, or where the memory is full.
-        """
-        try:
-            with reading(Path(self.frame.name)):
-                yield
-        except InputError as error:
-            raise ScanError(self.frame, error) from error
 
 
 class ScanError(InputError):
@@ -72,7 +42,7 @@ class RecentFrames:
 
     def __init__(self, window: Window) -> None:
         self.window = window
-        self._kept: deque[tuple[Frame, PlacedScan]] = deque()
+        self._kept: deque[PlacedScan] = deque()
         self._given = 0  # number of kept frames already returned; later frames still need them
 
     @property
@@ -82,38 +52,36 @@ class RecentFrames:
 
     def frame_of(self, scan: Scan) -> Frame:
         """A frame of a scan alone, as the one that would follow."""
-        number = self._kept[-1][0].number + 1 if self._kept else 0
+        number = self._kept[-1].frame.number + 1 if self._kept else 0
         return MemoryFrame(key=f"{number:06d}", number=number, scan=scan)
 
     def starts_new_recording(self, frame: Frame) -> bool:
         """True if a frame does not follow those that were taken."""
-        return bool(self._kept) and not frame.follows(self._kept[-1][0])
+        return bool(self._kept) and not frame.follows(self._kept[-1].frame)
 
-    def push(self, frame: Frame, placed: PlacedScan) -> FrameInWindow | None:
+    def push(self, placed: PlacedScan) -> WindowOfScans | None:
         """Takes the next frame; a new recording drops those still waiting.
 
         Args:
-            frame: The frame.
-            placed: Its scan, and when and where it was taken as far as that is needed.
+            placed: The frame, its scan, and where it was taken as far as that is needed.
 
         Returns:
             The frame whose window is now complete, if there is one.
         """
-        if self.starts_new_recording(frame):
+        if self.starts_new_recording(placed.frame):
             self._kept.clear()
             self._given = 0
-        self._kept.append((frame, placed))
+        self._kept.append(placed)
         return self.pop() if self.waiting > self.window.after else None
 
-    def pop(self) -> FrameInWindow:
+    def pop(self) -> WindowOfScans:
         """Gives the oldest waiting frame with what there is of its window."""
         place = self._given
-        frame, judged = self._kept[place]
-        scans = [placed for _, placed in self._kept]
+        scans = [*self._kept]
         after = scans[place + 1 : place + 1 + self.window.after]
         before = scans[max(place - self.window.before, 0) : place]
         self._given += 1
         while self._given > self.window.before:  # no later window reaches back so far
             self._kept.popleft()
             self._given -= 1
-        return FrameInWindow(frame, WindowOfScans(judged, before, after))
+        return WindowOfScans(scans[place], before, after)

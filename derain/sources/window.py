@@ -7,6 +7,7 @@ import numpy as np
 
 from derain.files.documents import Entry
 from derain.scan import Floats, Scan
+from derain.sources.frame import Frame
 
 # Scans kept at a time are bounded: each takes some 30 MB with its neighbours and rays.
 MOST_SCANS = 50
@@ -46,12 +47,14 @@ class PlacedScan:
     """A scan of a sequence, and where the sensor took it.
 
     Attributes:
+        frame: Its frame.
         scan: The scan, in the frame of its sensor.
         pose: Takes the sensor's frame to that of the world, float64 (4, 4), metres; None where it
             is not known.
         stretch: Scans of one number have poses in one world, with none in doubt between them.
     """
 
+    frame: Frame
     scan: Scan
     pose: Floats | None = None
     stretch: int = 0
@@ -78,8 +81,3 @@ class WindowOfScans:
     judged: PlacedScan
     before: Sequence[PlacedScan] = ()
     after: Sequence[PlacedScan] = ()
-
-    @property
-    def scan(self) -> Scan:
-        """The scan that is to be judged."""
-        return self.judged.scan

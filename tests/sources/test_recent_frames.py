@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from derain.evaluation.hard_cases import scene
 from derain.scan import Scan
 from derain.sources.frame import MemoryFrame
-from derain.sources.recent_frames import FrameInWindow, RecentFrames
-from derain.sources.window import PlacedScan, Window
+from derain.sources.recent_frames import RecentFrames
+from derain.sources.window import PlacedScan, Window, WindowOfScans
 
 SCAN = Scan.of(scene(1))
 
@@ -22,12 +22,10 @@ def frames(*lengths: int) -> list[MemoryFrame]:
     ]
 
 
-def seen(given: FrameInWindow) -> tuple[list[float | None], ...]:
-    """Times, held in `stretch`, of the frames before, of the frame, and of those after."""
-    scans = given.scans
-    assert scans.judged.stretch == given.frame.time
+def seen(scans: WindowOfScans) -> tuple[list[float | None], ...]:
+    """Times of the frames before, of the frame, and of those after."""
     parts = (scans.before, [scans.judged], scans.after)
-    return tuple([placed.stretch for placed in part] for part in parts)
+    return tuple([placed.frame.time for placed in part] for part in parts)
 
 
 @given(
@@ -41,7 +39,7 @@ def test_windows_are_those_of_the_whole_recording(lengths, before, after) -> Non
     for frame in frames(*lengths):
         if recent.starts_new_recording(frame):
             found += [recent.pop() for _ in range(recent.waiting)]
-        given_back = recent.push(frame, PlacedScan(SCAN, stretch=frame.time))
+        given_back = recent.push(PlacedScan(frame, SCAN))
         found += [given_back] if given_back else []
         assert recent.waiting <= after
     found += [recent.pop() for _ in range(recent.waiting)]
@@ -60,7 +58,7 @@ def test_windows_are_those_of_the_whole_recording(lengths, before, after) -> Non
 def test_nothing_is_kept_that_no_window_asks_for() -> None:
     recent = RecentFrames(Window(1, 2))
     for frame in frames(50):
-        recent.push(frame, PlacedScan(SCAN, stretch=frame.time))
+        recent.push(PlacedScan(frame, SCAN))
     assert len(recent._kept) == 3  # one given back, two that wait
 
 
@@ -68,11 +66,9 @@ def test_nothing_is_kept_that_no_window_asks_for() -> None:
 def test_a_gap_starts_anew(number) -> None:
     recent = RecentFrames(Window(1, 1))
     all_of_them = frames(10)
-    recent.push(all_of_them[2], PlacedScan(SCAN, stretch=all_of_them[2].time))
-    recent.push(all_of_them[3], PlacedScan(SCAN, stretch=all_of_them[3].time))
+    recent.push(PlacedScan(all_of_them[2], SCAN))
+    recent.push(PlacedScan(all_of_them[3], SCAN))
     assert recent.starts_new_recording(all_of_them[number])
-    assert (
-        recent.push(all_of_them[number], PlacedScan(SCAN, stretch=all_of_them[number].time)) is None
-    )
+    assert recent.push(PlacedScan(all_of_them[number], SCAN)) is None
     assert recent.waiting == 1
     assert seen(recent.pop()) == ([], [number], [])

@@ -21,12 +21,12 @@ from derain.jobs.workers import WorkerPool
 from derain.sources.clean_sink import CleanSink, Destination
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
-from derain.sources.recent_frames import FrameInWindow
+from derain.sources.recent_frames import ScanError
 from derain.sources.source import Source
 from derain.sources.unit_cleaning import UnitCleaning
 from derain.sources.units import Division, units_of
 from derain.sources.weather_monitor import WeatherOptions
-from derain.sources.window import Window
+from derain.sources.window import Window, WindowOfScans
 
 SCANS = 7
 
@@ -93,11 +93,12 @@ class Failing(Between):
     def depends_on(self, recording: Sequence[Frame]) -> Window:
         return self.window
 
-    def _judged(self, ready: FrameInWindow) -> Judgement:
-        if ready.frame.number in self.bad:
-            with ready.naming_errors():
-                raise derain.InputError("network", f"fails at {ready.frame.number}", "Mend it.")
-        return super()._judged(ready)
+    def _judged(self, scans: WindowOfScans) -> Judgement:
+        frame = scans.judged.frame
+        if frame.number in self.bad:
+            error = derain.InputError("network", f"fails at {frame.number}", "Mend it.")
+            raise ScanError(frame, error)
+        return super()._judged(scans)
 
 
 @pytest.fixture(scope="module")
