@@ -67,7 +67,7 @@ from derain.sources.bag_frame import BagFrame
 from derain.sources.clean_sink import CleanSink
 from derain.sources.cleaned_bags import RAIN_PROBABILITY, BagOptions
 from derain.sources.cleaned_scan import ScanOutcome
-from derain.sources.cleaning import CleaningObserver, CleanReport, clean
+from derain.sources.cleaning import CleanReport, clean
 from derain.sources.method import Method
 from derain.sources.recordings import irregularities
 from derain.sources.store_listing import frames_at
@@ -75,7 +75,7 @@ from derain.sources.stored_frame import StoredBag
 from derain.sources.window import MOST_SCANS
 from derain.stores.url import Place, is_url, place_of
 from derain.system.notices import Notices, warn
-from derain.views.scan_issues import MOST_RAIN, ScanIssue
+from derain.views.scan_issues import MOST_RAIN
 from derain.weather.record import weather_row
 
 # Options that only --help-all shows.
@@ -171,7 +171,11 @@ def main(arguments: argparse.Namespace) -> int:
     with (
         sink,
         weather_options.weather_table(arguments.weather, sink.targets()) as rows,
-        noting_progress(sink.so_far),
+        noting_progress(
+            lambda: (
+                f"{printer.cleaned:,} of {len(source):,} scans are written, a bag only as a whole"
+            )
+        ),
         unit_options.executor_of(arguments, workers) as executor,
     ):
         printer = _Printer(arguments.out, rows, arguments.json)
@@ -189,7 +193,7 @@ def main(arguments: argparse.Namespace) -> int:
             sink,
             most_removed=arguments.most_removed,
             weather=weather,
-            observer=printer,
+            watch=printer.take,
             division=division,
             executor=executor,
         )
@@ -230,14 +234,19 @@ def _with_scans_around(method: Method, arguments: argparse.Namespace, several: b
     )
 
 
-class _Printer(CleaningObserver):
-    """Prints the results, and collects one row of the weather table per scan."""
+class _Printer:
+    """Prints the results, and collects one row of the weather table per scan.
+
+    Attributes:
+        cleaned: Number of scans that are cleaned.
+    """
 
     def __init__(self, out: Place, rows: list[Sequence[object]], as_json: bool) -> None:
         self._out = out
         self._notices = Notices()
         self._rows = rows
         self._as_json = as_json
+        self.cleaned = 0
         self._example = Truth()
         self._stream = sys.stderr if as_json else sys.stdout
 
@@ -260,24 +269,19 @@ class _Printer(CleaningObserver):
             look = "Look at it: derain view example --out figure.png"
             print_lines(f"{self._example} {look}", self._stream)
 
-    def noticed(self, scan: str, odd: list[ScanIssue]) -> None:
-        """Warns of a scan's issues."""
-        self._notices.warn(scan, odd)
-
-    def cleaned(self, outcome: ScanOutcome) -> None:
-        """Adds a row to the table, and prints a line."""
-        self.found(outcome)
-        print_facts(asdict(outcome.figures), str(outcome.figures), self._as_json)
-        if not is_url(self._out):
-            self._example.add(outcome.frame.name, Path(self._out, f"{outcome.frame.key}{LABEL}"))
-
-    def found(self, outcome: ScanOutcome) -> None:
-        """Adds a row to the table."""
+    def take(self, outcome: ScanOutcome) -> None:
+        """Prints the warnings and the results of a scan, or its error, and adds a row."""
+        self._notices.warn(outcome.frame.name, outcome.issues)
+        if outcome.error is not None:
+            print_error(outcome.error)
+            return
+        self.cleaned += 1
         scan = outcome.figures
         if scan.weather is not None and (measured := outcome.measured) is not None:
             row = weather_row(scan.weather, measured)
             self._rows.append([printable(scan.scan), outcome.seconds, *row])
-
-    def failed(self, error: InputError) -> None:
-        """Prints the error of a scan that is not cleaned."""
-        print_error(error)
+        if outcome.was_there:
+            return
+        print_facts(asdict(scan), str(scan), self._as_json)
+        if not is_url(self._out):
+            self._example.add(outcome.frame.name, Path(self._out, f"{outcome.frame.key}{LABEL}"))

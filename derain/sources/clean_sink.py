@@ -91,7 +91,6 @@ class CleanSink:
             self._refuse_nameless()
         if self._removed is not None:
             self._refuse_removed(self._removed)
-        self._written = self._written_for_it = 0
 
     def __enter__(self) -> Self:
         for sink in filter(None, (self._files, self._removed)):
@@ -138,7 +137,6 @@ class CleanSink:
         if self._removed is not None:
             write_scan(self._removed.scan_path(frame), scan.take(rain))
         self._files.write(frame, scan.take(~rain), rain)
-        self._written += 1
 
     def finish_bags(self, given: Sequence[Frame]) -> Iterator[tuple[Frame, InputError]]:
         """Puts the last bag in its place, unless clouds of it may follow.
@@ -155,22 +153,6 @@ class CleanSink:
         for frame in self._source:
             if isinstance(frame, BagFrame) and frame.clouds in broken:
                 yield frame, broken[frame.clouds]
-
-    def count(self) -> None:
-        """Counts a scan that is written for it, by a sink of its :attr:`destination`."""
-        self._written_for_it += 1
-
-    def so_far(self) -> str:
-        """Number of scans in files, and of bags, that are written; or of all scans, in units."""
-        if self._written_for_it:
-            return f"{self._written_for_it:,} of {len(self._source):,} scans are written"
-        scans = sum(not self._bags.takes(frame) for frame in self._source)
-        parts = (
-            (self._written, scans, "scans"),
-            (len(self._bags.written), len(self._bags.targets()), "bags"),
-        )
-        counts = (f"{written:,} of {there:,} {what}" for written, there, what in parts if there)
-        return f"{' and '.join(counts)} are written, each of them whole"
 
     def _is_among_scans(self, folder: Path) -> bool:
         """True if a folder without scans of its own lies in the one that holds all scans."""

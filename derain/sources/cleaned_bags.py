@@ -76,7 +76,6 @@ class CleanedBags:
         self._stack = ExitStack()
         self._current: tuple[CloudTopic, BagCopy] | None = None
         self._broken: dict[CloudTopic, InputError] = {}
-        self.written: list[Path] = []
 
     def takes(self, frame: Frame) -> bool:
         """True if a frame is of a bag that is copied."""
@@ -182,7 +181,6 @@ class CleanedBags:
             with self._stack, writing(target):
                 target.parent.mkdir(parents=True, exist_ok=True)
                 _move(copy.finish(), target)
-                self.written.append(target)
         except InputError as error:
             self._broken[clouds] = error
 

@@ -78,6 +78,7 @@ class ScanOutcome:
         error: The error of a scan that could not be cleaned; None if it was cleaned.
         recording: The unbroken recording that it is of, where only its unit shows that.
         uploaded: Sizes and versions of what its unit uploaded, by path, with the last scan of it.
+        was_there: True if an earlier run had cleaned it.
     """
 
     frame: Frame
@@ -88,6 +89,7 @@ class ScanOutcome:
     error: InputError | None = None
     recording: str | None = None
     uploaded: Mapping[str, str] = field(default_factory=dict)
+    was_there: bool = False
 
     @property
     def figures(self) -> CleanedScan:

@@ -1,6 +1,7 @@
 """Cleans the scans of a source, and reports the results."""
 
 from collections import defaultdict
+from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,7 +20,7 @@ from derain.sources.stored_frame import StoredFrame
 from derain.sources.unit_cleaning import UnitCleaning
 from derain.sources.units import Division, folder_of_paths, units_of, whole
 from derain.sources.weather_monitor import WeatherMonitor, WeatherOptions
-from derain.views.scan_issues import MOST_RAIN, ScanIssue
+from derain.views.scan_issues import MOST_RAIN
 
 
 @dataclass(frozen=True)
@@ -59,22 +60,6 @@ class CleanReport:
         )
 
 
-class CleaningObserver:
-    """Follows a cleaning while it runs. A subclass prints or records; this one does nothing."""
-
-    def noticed(self, scan: str, odd: list[ScanIssue]) -> None:
-        """Called for each judged scan with warnings about it."""
-
-    def cleaned(self, outcome: ScanOutcome) -> None:
-        """Called for each scan that is written; a bag may still fail at a later one."""
-
-    def found(self, outcome: ScanOutcome) -> None:
-        """Called for each scan that an earlier run has written."""
-
-    def failed(self, error: InputError) -> None:
-        """Called for each scan that could not be cleaned, and once for a whole bag."""
-
-
 def clean(
     source: GivenScans,
     method: Method,
@@ -82,7 +67,7 @@ def clean(
     *,
     most_removed: float = MOST_RAIN,
     weather: WeatherOptions = WeatherOptions(),
-    observer: CleaningObserver = CleaningObserver(),
+    watch: Callable[[ScanOutcome], None] = lambda outcome: None,
     division: Division | None = None,
     executor: Submits | None = None,
 ) -> CleanReport:
@@ -101,7 +86,8 @@ def clean(
         sink: Folder or URL to write to, or a sink with its options, opened by ``with``.
         most_removed: Scans with a greater share of rain in their valid points are not written.
         weather: Options for measuring the weather.
-        observer: Follows the cleaning.
+        watch: Called for each scan that is written, though a bag may still fail at a later one; for
+            each that could not be cleaned, and once for a whole bag.
         division: Division of the scans into units. Where there are more scans than a block has,
             the folder keeps a record of each unit, and a run resumes from them after a stop.
             None keeps no records, unless there is an executor, or a source or a sink in an object
@@ -138,35 +124,28 @@ def clean(
             )
             written_to = () if opened.destination.is_stored else (opened.folder,)
             task = Task(job, work, folder_of_paths(source, *written_to))
-            outcomes, in_units = run(task, units, executor), True
+            outcomes = run(task, units, executor)
         else:
             units = [whole(source)]
             cleaning = work.clean(units[0], opened)
             outcomes = ((units[0], outcome, False) for outcome in cleaning)
-            in_units = False
         scans = sum(len(unit.frames) for unit in units)
         found: dict[str, set[str]] = defaultdict(set)
         for of_unit, outcome, was_there in tqdm(outcomes, total=scans, unit="scan", disable=None):
             key = outcome.frame.key
             found[of_unit.id].add(key)
-            observer.noticed(outcome.frame.name, outcome.issues)
             if outcome.error is not None:
                 cleaned.pop(key, None)  # of a bag that failed at a later cloud
                 if str(outcome.error) not in failures:
                     failures[str(outcome.error)] = outcome.error
-                    observer.failed(outcome.error)
+                    watch(outcome)
                 continue
-            if in_units:  # else the sink has written it, and counts itself
-                opened.count()
             if (measured := outcome.measured) is not None:
                 record = monitor.add(outcome.frame, measured, outcome.recording)
                 outcome = replace(outcome, cleaned=replace(outcome.figures, weather=record))
-            if was_there:
-                observer.found(outcome)
-            else:
-                observer.cleaned(outcome)
             before += was_there
             cleaned[key] = outcome.figures
+            watch(replace(outcome, was_there=was_there))
     # How many clouds the bags of a store have shows only when they are fetched.
     scans = sum(max(len(unit.frames), len(found[unit.id])) for unit in units)
     not_cleaned = scans - len(cleaned)

@@ -9,7 +9,7 @@ from typing import Any
 from derain.datamodules.labelled import card_of, labelled_scans, rain_rates
 from derain.datamodules.scan_data import Loading, ScanData
 from derain.default import DEFAULT
-from derain.errors import InputError, printable
+from derain.errors import printable
 from derain.example import EXAMPLE, Truth
 from derain.export.bench.bench import Bench, bench
 from derain.export.bench.cost import Effort
@@ -23,12 +23,11 @@ from derain.pictures.scan_pictures import before_after_figure, save
 from derain.simulation.campaign import Campaign, partition
 from derain.simulation.dataset import simulate_track
 from derain.sources.cleaned_scan import ScanOutcome
-from derain.sources.cleaning import CleaningObserver, CleanReport, clean
+from derain.sources.cleaning import CleanReport, clean
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.system.cores import usable_cores
 from derain.system.notices import Notices, warn
-from derain.views.scan_issues import ScanIssue
 from derain.workflows.fit import fit
 from derain.workflows.learn import export_checkpoint
 from derain.workflows.progress import Show, Steps, show_nothing
@@ -162,7 +161,7 @@ def _clean(config: DemoConfig, title: str, frame: Frame, steps: Steps) -> None:
     folder, model = Path(frame.name).parent, config.model(title)
     steps.begin(f"Cleaning: {folder}, by {model}")
     method, out = load_method(str(model), {}), config.out / "cleaned"
-    report = clean(named_frames([folder]), method, out, observer=Watch(out))
+    report = clean(named_frames([folder]), method, out, watch=Watch(out).take)
     picture, heading = config.out / "before_after.png", f"Simulated rain, cleaned by {title}"
     _draw_before_and_after(frame, str(model), heading, picture)
     steps.end(f"{report}; before and after: {picture}")
@@ -201,7 +200,7 @@ def _command(*words: str | Path) -> str:
     return printable(shlex.join(["derain", *map(str, words)]))
 
 
-class Watch(CleaningObserver):
+class Watch:
     """Prints warnings about scans, and counts the removed rain of the example.
 
     Args:
@@ -216,17 +215,13 @@ class Watch(CleaningObserver):
         self._labels = labels
         self._notices = Notices()
 
-    def noticed(self, scan: str, odd: list[ScanIssue]) -> None:
-        """Prints warnings about a scan."""
-        self._notices.warn(scan, odd)
-
-    def cleaned(self, outcome: ScanOutcome) -> None:
-        """Compares the labels of a scan with those of the example."""
+    def take(self, outcome: ScanOutcome) -> None:
+        """Prints the warnings or the error of a scan, and compares its labels with the truth."""
+        self._notices.warn(outcome.frame.name, outcome.issues)
+        if outcome.error is not None:
+            warn(str(outcome.error))
+            return
         self.truth.add(outcome.frame.name, self._labels / f"{outcome.frame.key}{LABEL}")
-
-    def failed(self, error: InputError) -> None:
-        """Warns of a scan that is left whole or cannot be read."""
-        warn(str(error))
 
 
 def clean_given_scans(scans: Path, columns: Sequence[str], out: Path, steps: Steps) -> CleanReport:
@@ -243,7 +238,7 @@ def clean_given_scans(scans: Path, columns: Sequence[str], out: Path, steps: Ste
     """
     steps.begin(f"Cleaning: {scans}, by the model that comes with derain")
     source, watch = named_frames([scans], columns), Watch(out)
-    report = clean(source, load_method(DEFAULT, {}), out, observer=watch)
+    report = clean(source, load_method(DEFAULT, {}), out, watch=watch.take)
     heading = f"{source[0].key}, cleaned by the model that comes with derain"
     picture = out / "before_after.png"
     _draw_before_and_after(source[0], DEFAULT, heading, picture)

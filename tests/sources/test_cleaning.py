@@ -9,28 +9,17 @@ from recorded_scenes import write_scenes
 import derain
 from derain.files.labels import read_labels
 from derain.sources.cleaned_scan import ScanOutcome
-from derain.sources.cleaning import CleaningObserver
-
-
-class Recorder(CleaningObserver):
-    """Records what it is called for."""
-
-    def __init__(self) -> None:
-        self.calls: list[tuple[str, str]] = []
-
-    def cleaned(self, outcome: ScanOutcome) -> None:
-        self.calls.append(("cleaned", Path(outcome.frame.name).name))
-
-    def failed(self, error: derain.InputError) -> None:
-        self.calls.append(("failed", Path(str(error.subject)).name))
 
 
 def test_a_scan_that_cannot_be_read_is_reported_and_the_others_are_cleaned(tmp_path) -> None:
     scans, out = write_scenes(tmp_path / "scans", *3 * [200], name="{}.bin"), tmp_path / "out"
     (scans / "1.bin").write_bytes(b"broken")
-    dror, recorder = derain.FilterDerainer(derain.DROR()), Recorder()
-    report = derain.clean(scans, dror, out, most_removed=1, observer=recorder)
-    assert recorder.calls == [("cleaned", "0.bin"), ("failed", "1.bin"), ("cleaned", "2.bin")]
+    dror = derain.FilterDerainer(derain.DROR())
+    outcomes: list[ScanOutcome] = []
+    report = derain.clean(scans, dror, out, most_removed=1, watch=outcomes.append)
+    names = [Path(outcome.frame.name).name for outcome in outcomes]
+    assert names == ["0.bin", "1.bin", "2.bin"]
+    assert [outcome.error is None for outcome in outcomes] == [True, False, True]
     assert [Path(str(error.subject)).name for error in report.failures] == ["1.bin"]
     assert str(report).startswith("2 scans, 1 not cleaned: 400 points")
     assert {path.name for path in out.iterdir()} == {"0.bin", "0.label", "2.bin", "2.label"}
