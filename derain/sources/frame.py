@@ -190,12 +190,10 @@ class MemoryFrame(Frame):
     Attributes:
         scan: The scan.
         time: Time at which it was taken, seconds; None if unknown.
-        reads_labels: True if its labels are to be read.
     """
 
     scan: Scan
     time: float | None = None
-    reads_labels: bool = True
 
     @property
     def name(self) -> str:
@@ -204,8 +202,8 @@ class MemoryFrame(Frame):
 
     @property
     def has_labels(self) -> bool:
-        """True if its scan has labels that are to be read."""
-        return self.reads_labels and self.scan.label is not None
+        """True if its scan has labels."""
+        return self.scan.label is not None
 
     def read(self) -> Scan:
         """The scan, without labels."""
@@ -237,7 +235,7 @@ class MemoryFrame(Frame):
 
     def without_labels(self) -> Self:
         """The same frame without its labels."""
-        return replace(self, label_path=None, reads_labels=False)
+        return replace(self, label_path=None, scan=replace(self.scan, label=None))
 
 
 def times_of(frames: Sequence[Frame]) -> list[float] | None:

@@ -11,7 +11,7 @@ from derain.files.reading import reading
 from derain.jobs.running import Result, Work
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
-from derain.sources.judging import AnswerOrError, answers
+from derain.sources.judging import answers
 from derain.sources.method import Method
 from derain.sources.units import FrameUnit, shared_options
 from derain.system.stopwatch import Stopwatch
@@ -56,34 +56,28 @@ class UnitJudging(Work[FrameUnit, ResultT]):
         Args:
             unit: The unit.
             result: Makes it of a frame, its judgement, and the times of the stages.
-        """
-        for frame, answer, stopwatch in self.judged(unit):
-            try:
-                if isinstance(answer, InputError):
-                    raise answer
-                with reading(Path(frame.name)):  # which names the file where the memory is full
-                    made = result(frame, answer, stopwatch)
-            except InputError as error:
-                made = self.failure(frame, error)
-            yield made
-
-    def judged(self, unit: FrameUnit) -> Iterator[AnswerOrError]:
-        """Judges the frames of a unit, and reads those around them that the method sees.
 
         Yields:
-            Each frame of the unit once, with its answer or the reason why it has none.
+            The result of each frame of the unit, once.
         """
         frames = (*unit.before, *unit.frames, *unit.after)
         waiting = dict.fromkeys(unit.frames)  # those without answer, in order
         for frame, answer, stopwatch in answers(self.method, frames):
             if frame in waiting:
                 del waiting[frame]
-                yield frame, answer, stopwatch
+                try:
+                    if isinstance(answer, InputError):
+                        raise answer
+                    with reading(Path(frame.name)):  # which names the file where memory is full
+                        made = result(frame, answer, stopwatch)
+                except InputError as error:
+                    made = self.failure(frame, error)
+                yield made
             if unit.after and not waiting:
                 break  # those after the unit need no answer
         for frame in waiting:  # of a method whose errors do not name the scan
             none = InputError(frame.name, "has no answer", "See the errors of the scans around it.")
-            yield frame, none, Stopwatch()
+            yield self.failure(frame, none)
 
     def options(self, command: str, source: Sequence[Frame], block: int) -> dict[str, Any]:
         """The options that the answers depend on besides the scans, for the job of a command.

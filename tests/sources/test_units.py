@@ -19,6 +19,7 @@ from derain.export.recorded import RecordedDerainer
 from derain.jobs.shard import Shard
 from derain.jobs.workers import WorkerPool
 from derain.sources.clean_sink import CleanSink, Destination
+from derain.sources.cleaned_scan import ScanOutcome
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.recent_frames import ScanError
@@ -119,12 +120,13 @@ def test_each_scan_of_a_unit_has_one_outcome_whichever_fail(
     method = Failing(Window(past, delay), bad)
     out = Destination("out", None, CleanSink)
     for unit in units_of(recording, method, block):
-        outcomes = list(UnitCleaning(method, "", out, 1.0, None).judged(unit))
-        assert [frame for frame, _, _ in outcomes] == list(unit.frames)  # each when it is met
-        errors = {frame: each for frame, each, _ in outcomes if isinstance(each, derain.InputError)}
-        assert all(error.subject == frame.name for frame, error in errors.items())
-        failed = {frame.number for frame in errors}
-        assert failed == bad & {frame.number for frame in unit.frames}
+        work = UnitCleaning(method, "", out, 1.0, None)
+        outcomes = list(work.results(unit, lambda frame, *_: ScanOutcome(frame, [])))
+        assert [each.frame for each in outcomes] == list(unit.frames)  # each when it is met
+        failed = [each for each in outcomes if each.error is not None]
+        assert all(each.error.subject == each.frame.name for each in failed)
+        numbers = {each.frame.number for each in failed}
+        assert numbers == bad & {frame.number for frame in unit.frames}
 
 
 def test_poses_that_units_find_are_those_of_one_run(drive, tmp_path) -> None:
