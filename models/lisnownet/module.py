@@ -142,12 +142,6 @@ class LiSnowNet(DerainingModule, Published):
             InputError: A state_dict of another network, or no grid.
         """
         network = LiSnowNetwork.from_published(state_dict)
-        if network.channels != 2:
-            raise InputError(
-                cls.NAME,
-                f"the weights are for {network.channels} channels",
-                "Give weights for range and intensity.",
-            )
         model = cls(grid=require_grid(grid, cls.NAME), width=network.width)
         model.network = network
         model.adopt(model.spec_for(card))

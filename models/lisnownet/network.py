@@ -21,6 +21,9 @@ from derain.models.published import network_of, published_tensors
 
 HALVINGS = 4
 
+# Channels of an image: range and intensity.
+CHANNELS = 2
+
 # What the parts of our parameters' names are called in the published state_dict.
 PUBLISHED_WORDS = {
     "encoder.": "enc",
@@ -105,29 +108,26 @@ class LiSnowNetwork(nn.Module):
         torch.Size([1, 2, 32, 128])
 
     Args:
-        channels: Channels of the image.
         width: Channels of the features at full size; each halving doubles them.
         dropout: Share of channels dropped in each residual block in training.
 
     Raises:
-        InputError: Channels or a width below 1.
+        InputError: A width below 1.
     """
 
-    def __init__(self, channels: int = 2, width: int = 8, dropout: float = 0.5) -> None:
+    def __init__(self, width: int = 8, dropout: float = 0.5) -> None:
         super().__init__()
-        if channels < 1 or width < 1:
-            raise InputError(
-                "network", f"{channels} channels of width {width}", "Give numbers of at least 1."
-            )
-        self.channels, self.width = channels, width
+        if width < 1:
+            raise InputError("width", f"{width} is too few", "Give 1 or more.")
+        self.width = width
         block = partial(ResidualBlock, dropout=dropout)
         widths = [width * 2**level for level in range(HALVINGS + 1)]
         # Stage by stage from full size to the smallest, in the encoder and in the decoder alike.
         self.encoder = nn.ModuleList(
-            [nn.Sequential(block(channels + 1, width), block(width, width))]
+            [nn.Sequential(block(CHANNELS + 1, width), block(width, width))]
         )
         self.decoder = nn.ModuleList(
-            [nn.Sequential(block(width, width), block(width, width), nn.Conv2d(width, channels, 1))]
+            [nn.Sequential(block(width, width), block(width, width), nn.Conv2d(width, CHANNELS, 1))]
         )
         for finer, coarser in pairwise(widths):
             self.encoder.append(
@@ -150,9 +150,8 @@ class LiSnowNetwork(nn.Module):
         """
         keys = {name: published_key(name) for name in cls().state_dict()}
         tensors = published_tensors(state_dict, keys, "LiSnowNet")
-        channels = tensors["decoder.0.2.bias"].numel()
         width = tensors["decoder.0.0.path.0.norm.bias"].numel()
-        return network_of(lambda: cls(channels, width), tensors, "LiSnowNet")
+        return network_of(lambda: cls(width), tensors, "LiSnowNet")
 
     def forward(self, image: Tensor, valid: Tensor) -> Tensor:
         """Denoises range images.

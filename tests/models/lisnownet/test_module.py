@@ -21,7 +21,6 @@ from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
 from derain.learning.batch import Batch
 from derain.models.lisnownet import LiSnowNet
-from derain.models.lisnownet.network import LiSnowNetwork
 from derain.models.lisnownet.selection_rule import FEWEST, SelectionRule, cube_roots, rain_logits
 from derain.models.lisnownet.sparsity import sparsity_loss
 from derain.models.measured import MONITOR
@@ -168,12 +167,10 @@ def test_published_weights_are_taken_over(image_network, sample) -> None:
     assert model.selection == SelectionRule()
 
 
-def test_weights_need_a_grid_and_two_channels(image_network) -> None:
+def test_weights_need_a_grid(image_network) -> None:
     weights = published(image_network(LiSnowNet).network)
     with pytest.raises(InputError, match=r"the grid .*Give --grid\."):
         LiSnowNet.from_published(weights, WADS)
-    with pytest.raises(InputError, match="channels"):
-        LiSnowNet.from_published(published(LiSnowNetwork(channels=3, width=2)), WADS, "wads")
 
 
 class Progress(lightning.Callback):

@@ -27,11 +27,9 @@ def published(network: nn.Module) -> dict[str, Tensor]:
     return {published_key(name): tensor for name, tensor in network.state_dict().items()}
 
 
-def small(channels: int = 2, width: int = 4, seed: int = 0) -> LiSnowNetwork:
+def small(width: int = 4, seed: int = 0) -> LiSnowNetwork:
     """A network with weights and statistics that leave no BatchNorm without effect."""
-    shapes = {
-        key: tensor.shape for key, tensor in published(LiSnowNetwork(channels, width)).items()
-    }
+    shapes = {key: tensor.shape for key, tensor in published(LiSnowNetwork(width)).items()}
     return LiSnowNetwork.from_published(recipe_weights(shapes, seed)).eval()
 
 
@@ -70,12 +68,12 @@ def test_the_image_is_that_of_the_published_network(shared) -> None:
     np.testing.assert_allclose(denoised, oracle["y"], rtol=0, atol=1e-4)
 
 
-@pytest.mark.parametrize(("channels", "width"), [(2, 4), (3, 2), (1, 1)])
+@pytest.mark.parametrize("width", [1, 2, 4])
 @torch.no_grad()
-def test_its_size_is_read_from_published_weights(channels, width) -> None:
-    network = small(channels, width)
+def test_its_size_is_read_from_published_weights(width) -> None:
+    network = small(width)
     read = LiSnowNetwork.from_published(published(network)).eval()
-    image, valid = torch.rand(1, channels, 16, 32), torch.rand(1, 1, 16, 32) < 0.5
+    image, valid = torch.rand(1, 2, 16, 32), torch.rand(1, 1, 16, 32) < 0.5
     assert torch.equal(read(image, valid), network(image, valid))
 
 
@@ -83,8 +81,8 @@ def test_its_size_is_read_from_published_weights(channels, width) -> None:
     ("change", "reason"),
     [
         ({"enc2.1.shortcut.conv.weight": torch.zeros(4, 4, 3, 3)}, "encoder.2.1.shortcut"),
-        ({"dec0.2.bias": torch.zeros(0)}, "at least 1"),
-        ({"dec0.0.main_block.0.bn.bias": torch.zeros(0)}, "at least 1"),
+        ({"dec0.2.bias": torch.zeros(0)}, "another network"),
+        ({"dec0.0.main_block.0.bn.bias": torch.zeros(0)}, "width"),
         ({"dec0.2.bias": torch.zeros(3)}, "another network"),
     ],
 )
