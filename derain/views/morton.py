@@ -4,8 +4,6 @@ Neighbours in space become neighbours in memory: the kNN search and the network'
 faster on points in this order, with the same answers.
 """
 
-from weakref import WeakKeyDictionary
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -116,21 +114,8 @@ def distinct_rows(scan: Scan) -> tuple[Ints, Ints]:
     Returns:
         ``first``, int64 (M,): the lowest row at each position, along a Morton curve; and
         ``inverse``, int64 (N,): for every row the number of its position; -1 for invalid rows, and
-        at positions of more than MOST_COPIES rows, which are left out. Both are read-only.
+        at positions of more than MOST_COPIES rows, which are left out.
     """
-    found = _of_last_scan.get(scan)
-    if found is None:
-        found = _distinct_rows(scan)
-        _of_last_scan.clear()
-        _of_last_scan[scan] = found
-    return found
-
-
-# Views, rays and pairs of returns ask in turn about the same scan.
-_of_last_scan: WeakKeyDictionary[Scan, tuple[Ints, Ints]] = WeakKeyDictionary()
-
-
-def _distinct_rows(scan: Scan) -> tuple[Ints, Ints]:
     valid = np.flatnonzero(scan.valid)
     # take is four times faster than indexing for rows of three numbers.
     first, position = distinct_positions(scan.xyz.take(valid, axis=0))
@@ -140,9 +125,7 @@ def _distinct_rows(scan: Scan) -> tuple[Ints, Ints]:
         position = np.where(are_copies, np.cumsum(are_copies) - 1, -1)[position]
     inverse = np.full(len(scan), -1, np.int64)
     inverse[valid] = position
-    first = valid[first]
-    first.flags.writeable = inverse.flags.writeable = False
-    return first, inverse
+    return valid[first], inverse
 
 
 def first_rows(scan: Scan) -> Ints:
