@@ -3,15 +3,14 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
-from dataclasses import Field, asdict, dataclass, fields
-from numbers import Integral, Real
+from dataclasses import asdict, dataclass, fields
 from types import MappingProxyType
 from typing import Any, ClassVar, Literal, get_args, get_origin
 
 import numpy as np
 
 from derain.errors import InputError, did_you_mean
-from derain.files.documents import short, shown
+from derain.files.documents import Entry, short
 from derain.scan import Bools, Ints, Scan
 from derain.system.registry import Registry, from_parameters
 from derain.system.stopwatch import Stopwatch
@@ -88,8 +87,13 @@ class PointFilter(ABC):
             if isinstance(value, np.generic):  # records and fingerprints hold primitives
                 value = value.item()
                 object.__setattr__(self, parameter.name, value)
-            if remedy := _remedy(parameter, value, self.FEWEST_NEIGHBOURS):
-                raise InputError(self.name, f"{parameter.name} is {shown(value)}", remedy)
+            entry = Entry(self.name, parameter.name, value)
+            if parameter.name == "neighbours":
+                entry.whole(self.FEWEST_NEIGHBOURS, MOST_FILTER_NEIGHBOURS)
+            elif parameter.type in (float, "float"):  # the text, where annotations are put off
+                entry.within(0, LARGEST_NUMBER)
+            elif get_origin(parameter.type) is Literal:
+                entry.one_of(get_args(parameter.type))
 
     @property
     def name(self) -> str:
@@ -206,18 +210,3 @@ def rows_of(points: Bools, inverse: Ints) -> Bools:
     """
     # The last place is for rows at no point, whose number is -1.
     return np.append(points, False).take(inverse)
-
-
-def _remedy(parameter: Field[Any], value: Any, fewest: int) -> str | None:
-    """The remedy for an impossible value of a parameter; None if the value is possible."""
-    is_number = isinstance(value, Real) and not isinstance(value, bool)
-    if parameter.name == "neighbours":
-        is_whole = is_number and isinstance(value, Integral)
-        if not (is_whole and fewest <= value <= MOST_FILTER_NEIGHBOURS):
-            return f"Give a whole number from {fewest} to {MOST_FILTER_NEIGHBOURS}."
-    elif parameter.type in (float, "float"):  # the text, where annotations are put off
-        if not (is_number and 0 <= value <= LARGEST_NUMBER):
-            return f"Give a finite number that is not negative, {LARGEST_NUMBER:g} at most."
-    elif get_origin(parameter.type) is Literal and value not in get_args(parameter.type):
-        return f"Give one of {', '.join(get_args(parameter.type))}."
-    return None
