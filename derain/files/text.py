@@ -39,20 +39,18 @@ def filled_lines(text: bytes) -> Iterator[Line]:
             yield number, line.rstrip(b"\r\n")
 
 
-def parse_rows(data: bytes, row: np.dtype[Any], start: int = 0, count: int | None = None) -> Array:
+def parse_rows(data: bytes, row: np.dtype[Any], count: int | None = None) -> Array:
     """Reads one structured value per line of numbers; empty lines are skipped.
 
     Args:
         data: The text.
         row: Dtype of a line; its fields may be sub-arrays.
-        start: Number of lines that come before.
         count: Number of lines to read, if there are as many; None reads all.
 
     Raises:
         ValueError: A line that is not of this dtype, or more lines than can be counted.
     """
-    asked = islice(filled_lines(data), start, None if count is None else start + count)
-    lines = (line for _, line in asked)
+    lines = (line for _, line in islice(filled_lines(data), count))
     first = next(lines, None)
     if first is None:
         return np.empty(0, row)

@@ -45,17 +45,13 @@ class Element:
     Attributes:
         name: Its name.
         count: Number of its rows.
-        properties: Name and type of its columns, in NumPy's spelling; None for a list, which only
-            elements behind the vertices may have.
+        properties: Name and type of its columns, in NumPy's spelling; None for a list, which the
+            vertices may not have.
     """
 
     name: str
     count: int
     properties: list[tuple[str, str | None]]
-
-    def size(self, encoding: str) -> int:
-        """Number of lines of text (ascii) or bytes (binary) of an element without lists."""
-        return self.count * (1 if encoding == "ascii" else self.row(encoding).itemsize)
 
     def row(self, encoding: str) -> np.dtype[Any]:
         """Dtype of a row.
@@ -97,8 +93,8 @@ class Ply(Format):
         """Reads the vertices of a PLY file.
 
         Args:
-            content: The file, version 1.0: ascii or binary, of either byte order. Lists
-                may come only behind the vertices, where a mesh has its faces.
+            content: The file, version 1.0: ascii or binary, of either byte order. The vertices
+                are its first element.
             columns: Not used: a PLY names its columns.
 
         Raises:
@@ -139,16 +135,19 @@ class Ply(Format):
 def _parse(content: bytes) -> tuple[PlyHeader, Array]:
     """The content of a file besides its vertices, and the vertices, structured (N,)."""
     encoding, comments, elements, data = _parse_header(content)
-    names = [element.name for element in elements]
-    if "vertex" not in names:
-        raise ValueError("no element named vertex")
-    place = names.index("vertex")
-    before, vertex, behind = elements[:place], elements[place], elements[place + 1 :]
+    if not elements or elements[0].name != "vertex":
+        raise ValueError("its first element is not vertex")
+    vertex, *others = elements
     if not vertex.properties:
         raise ValueError("the vertices have no properties")
-    start = sum(element.size(encoding) for element in before)
-    table = _read_rows(data, encoding, vertex.row(encoding), start, vertex.count)
-    left_out = tuple(element.name for element in before + behind if element.count)
+    row = vertex.row(encoding)
+    if encoding == "ascii":
+        table = parse_rows(data, row, vertex.count)
+    else:
+        table = np.frombuffer(data, row, min(len(data) // row.itemsize, vertex.count))
+    if len(table) < vertex.count:
+        raise ValueError(f"{len(table)} rows where the header states {vertex.count}")
+    left_out = tuple(element.name for element in others if element.count)
     return PlyHeader(encoding, comments, left_out), table
 
 
@@ -184,26 +183,3 @@ def _parse_header(content: bytes) -> tuple[str, tuple[str, ...], list[Element], 
         raise ValueError("no format in the header")
     check_columns(max((len(element.properties) for element in elements), default=0))
     return encoding, tuple(comments), elements, content[end.end() :]
-
-
-def _read_rows(data: bytes, encoding: str, row: np.dtype[Any], start: int, count: int) -> Array:
-    """Reads rows of an element.
-
-    Args:
-        data: Data of the file.
-        encoding: Its encoding.
-        row: Dtype of a row.
-        start: Number of lines of text (ascii) or bytes (binary) before them.
-        count: Number of rows.
-
-    Raises:
-        ValueError: There are fewer, or they are of another dtype.
-    """
-    if encoding == "ascii":
-        table = parse_rows(data, row, start, count)
-    else:
-        found = max(len(data) - start, 0) // row.itemsize if row.itemsize else 0
-        table = np.frombuffer(data, row, min(found, count), min(start, len(data)))
-    if len(table) < count:
-        raise ValueError(f"{len(table)} rows where the header states {count}")
-    return table
