@@ -171,11 +171,6 @@ def main(arguments: argparse.Namespace) -> int:
     with (
         sink,
         weather_options.weather_table(arguments.weather, sink.targets()) as rows,
-        noting_progress(
-            lambda: (
-                f"{printer.cleaned:,} of {len(source):,} scans are written, a bag only as a whole"
-            )
-        ),
         unit_options.executor_of(arguments, workers) as executor,
     ):
         printer = _Printer(arguments.out, rows, arguments.json)
@@ -187,17 +182,18 @@ def main(arguments: argparse.Namespace) -> int:
         listed = (frame for frame in source if not isinstance(frame, unread))
         for sentence in irregularities(listed, method.window, needed=needed):
             warn(sentence)
-        report = clean(
-            source,
-            method,
-            sink,
-            most_removed=arguments.most_removed,
-            weather=weather,
-            watch=printer.take,
-            division=division,
-            executor=executor,
-        )
-        printer.summarise(report)
+        with noting_progress(lambda: printer.so_far(len(source))):
+            report = clean(
+                source,
+                method,
+                sink,
+                most_removed=arguments.most_removed,
+                weather=weather,
+                watch=printer.take,
+                division=division,
+                executor=executor,
+            )
+            printer.summarise(report)
     total = len(report.scans) + report.not_cleaned
     code = exit_code(report.not_cleaned, total, "{scans} could not be cleaned")
     return code or weather_options.warn_of_bad_weather(report.weather, arguments.fail_at)
@@ -268,6 +264,10 @@ class _Printer:
         if self._example.rain:
             look = "Look at it: derain view example --out figure.png"
             print_lines(f"{self._example} {look}", self._stream)
+
+    def so_far(self, scans: int) -> str:
+        """Number of scans that are written, of a number of scans."""
+        return f"{self.cleaned:,} of {scans:,} scans are written, and each bag only as a whole"
 
     def take(self, outcome: ScanOutcome) -> None:
         """Prints the warnings and the results of a scan, or its error, and adds a row."""
