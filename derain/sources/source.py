@@ -1,16 +1,15 @@
 """Sources of scans: frames in time order."""
 
-from collections.abc import Callable, Iterable, Sequence
-from typing import overload
+from collections.abc import Callable, Iterable
 
 from derain.scan import Array, Scan
 from derain.sources.frame import Frame, MemoryFrame
 
 
-class Frames(Sequence[Frame]):
+class Frames(tuple[Frame, ...]):
     """A source of scans: frames in time order, one sequence after the other.
 
-    It has a length and gives any of them again; nothing is read before a frame's ``read``.
+    Nothing is read before a frame's ``read``.
 
     Example:
         >>> import numpy as np
@@ -22,9 +21,6 @@ class Frames(Sequence[Frame]):
     Args:
         frames: The frames.
     """
-
-    def __init__(self, frames: Iterable[Frame]) -> None:
-        self._frames = tuple(frames)
 
     @classmethod
     def of_scans(cls, scans: Iterable[Scan | Array], sequence: str = "") -> "Frames":
@@ -45,18 +41,6 @@ class Frames(Sequence[Frame]):
             MemoryFrame(key=f"{folder}{number:06d}", sequence=sequence, number=number, scan=scan)
             for number, scan in enumerate(map(Scan.of, scans))
         )
-
-    def __len__(self) -> int:
-        return len(self._frames)
-
-    @overload
-    def __getitem__(self, place: int) -> Frame: ...
-
-    @overload
-    def __getitem__(self, place: slice) -> "Frames": ...
-
-    def __getitem__(self, place: int | slice) -> "Frame | Frames":
-        return Frames(self._frames[place]) if isinstance(place, slice) else self._frames[place]
 
     def map(self, change: Callable[[Frame], Frame]) -> "Frames":
         """The same frames, each changed, such as to be without labels."""
