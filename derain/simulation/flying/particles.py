@@ -101,7 +101,7 @@ class OpenBeams:
             count = min(count, len(self.directions))
             more = []
             for part in np.array_split(rows, 1 + len(rows) * count // PAIRS_AT_ONCE):
-                offset, beam = self._nearest(particles.place[part], count)
+                offset, beam = self.nearest(particles.place[part], count)
                 close = offset < within[part, None]
                 whole = ~close[:, -1] | (count == len(self.directions))
                 row, column = np.nonzero(close & whole[:, None])
@@ -111,12 +111,16 @@ class OpenBeams:
         meetings = Meetings.joined(found)
         return meetings.take(np.argsort(meetings.particle, kind="stable"))
 
-    def nearest(self, place: Floats) -> Ints:
-        """The beam whose axis passes each place nearest, int64 (P,); places float64 (P, 3)."""
-        return self._nearest(place, 1)[1][:, 0]
+    def nearest(self, place: Floats, count: int) -> tuple[Floats, Ints]:
+        """The beams whose axes pass places nearest, the nearest first.
 
-    def _nearest(self, place: Floats, count: int) -> tuple[Floats, Ints]:
-        """Offsets and rows of the nearest beams, nearest first, float64 and int64 (P, count)."""
+        Args:
+            place: Places, float64 (P, 3), sensor frame, metres.
+            count: Beams for each of them.
+
+        Returns:
+            Distances of the axes, float64 (P, count), metres, and rows, int64 (P, count).
+        """
         far = np.linalg.norm(place, axis=1, keepdims=True)
         # One thread, so that beams at the same distance come in the same order every time.
         beam, squared = self._tree.batch_knn_search(place / far, count, num_threads=1)
@@ -156,9 +160,8 @@ def draw_particles(
 
 def _by_nearest(drawn: Particles, drawn_for: Ints, stretch: Stretch, beams: OpenBeams) -> Bools:
     """True for particles that were drawn for the nearest of their possible beams."""
-    if not len(drawn_for):
-        return np.empty(0, np.bool_)
-    nearest = beams.nearest(drawn.place)
+    _, nearest = beams.nearest(drawn.place, 1)
+    nearest = nearest[:, 0]
     kept = nearest == drawn_for
     # Where the nearest of all could not draw it, such as behind a surface, another one counts.
     unsettled = np.flatnonzero(~stretch.holds(nearest, drawn.range) & ~kept)
