@@ -56,7 +56,7 @@ def _print_shares(root: Path) -> None:
 
 def _print_distances(root: Path) -> None:
     data = Simulated(str(root), make=False)
-    scans = map(data.read, data.frames("test"))
+    scans = map(data.reader.read, data.frames("test"))
     distance = np.concatenate([scan.range[data.card.rain_of(scan)] for scan in scans])
     if not len(distance):
         print("\nno rain in the test scans")

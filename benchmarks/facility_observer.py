@@ -106,14 +106,14 @@ def _examples(data: Simulated, root: Path) -> Iterator[Example]:
     sequences = find_sequences(root, CARD.layout)
     rates = {frames[0].sequence: rate or 0.0 for frames, rate in sequences}
     for frame in data.frames("test"):
-        scan = data.read(frame)
+        scan = data.reader.read(frame)
         alone = Path(frame.name.replace(CARD.layout.scans, CARD.layout.lidar))
         yield Example(scan, len(read_scan(alone)), CARD.rain_of(scan), rates[frame.sequence])
 
 
 def _truths(data: Simulated) -> Iterator[tuple[Scan, Bools]]:
     for frame in data.frames("train"):
-        scan = data.read(frame)
+        scan = data.reader.read(frame)
         yield scan, CARD.rain_of(scan)
 
 

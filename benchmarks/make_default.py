@@ -129,7 +129,7 @@ def _held_out(worlds: Path) -> Iterator[tuple[Scan, Bools]]:
     for folder in sorted(worlds.iterdir()):
         data = Worlds(str(folder), make=False)
         for frame in data.source("validation"):
-            scan = data.read(frame)
+            scan = data.reader.read(frame)
             yield scan, data.card.rain_of(scan)
 
 

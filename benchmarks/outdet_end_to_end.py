@@ -110,7 +110,7 @@ def _report_iou(methods: dict[str, Method], path: Path, card: DataCard) -> None:
 
 def _labelled(paths: list[Path], card: DataCard) -> list[Scan]:
     data = labelled_scans(paths, card, Loading())
-    return [data.read(frame) for frame in data.frames("train")]
+    return [data.reader.read(frame) for frame in data.frames("train")]
 
 
 if __name__ == "__main__":

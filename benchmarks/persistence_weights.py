@@ -87,7 +87,7 @@ def _described(roots: list[Path]) -> Iterator[Described]:
     card, model = load_card("simulated"), Derainer()
     data = named_scans(roots, card, Loading())
     for recording in recordings_of(data.source("test")):
-        scans = [data.read(frame) for frame in recording]
+        scans = [data.reader.read(frame) for frame in recording]
         points = [ScanPoints(scan, usable_cores()) for scan in scans]
         rows = [distinct_rows(scan)[0] for scan in scans]
         alone = [model.judge(scan) for scan in scans]

@@ -49,7 +49,7 @@ class ScanCheck(lightning.Callback):
             return
         frames, notices = data.frames(part), Notices()
         for frame in evenly_spaced(frames, self.scans):
-            found = model.spec.issues(data.read(frame))
+            found = model.spec.issues(data.reader.read(frame))
             notices.warn(frame.name, [replace(o, detail=_here(o.detail)) for o in found])
         notices.warn_of_repeats()
         if part in ("validation", "test"):

@@ -16,9 +16,7 @@ from derain.datamodules.augmentation import Augmentation
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS
 from derain.learning.task import Task
-from derain.scan import Scan
 from derain.sources.folders import frames_of, relative_keys
-from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
 from derain.sources.search import listed_scans
 from derain.sources.source import Source
@@ -105,25 +103,9 @@ class ScanData(ABC):
         reads_labels = self.task is None or self.task.reads_labels
         return with_needed_labels(self.source(part), part, reads_labels)
 
-    def read(self, frame: Frame) -> Scan:
-        """Reads a scan with its labels; for a model, with the columns that it sees.
-
-        Raises:
-            InputError: A file that cannot be read, or labels that are not in the data card.
-        """
-        return self.reader.read(frame)
-
-    def read_measured(self, frame: Frame) -> Scan:
-        """Reads the points of a scan that are measured, with their labels.
-
-        Raises:
-            InputError: A file that cannot be read, or labels that are not in the data card.
-        """
-        return self.reader.read_measured(frame)
-
     @property
     def reader(self) -> FrameReader:
-        """Reads them with their labels."""
+        """Reads scans with their labels; for a model, with the columns that it sees."""
         columns = None if self.task is None else self.task.columns
         return self.loading.reader(self.card, columns)
 

@@ -122,7 +122,7 @@ def _fit_candidates(model: "DerainingModule", data: "LabelledScans") -> None:
     notices = Notices()
 
     def read(frame: Frame) -> "Scan":
-        scan = data.read_measured(frame)
+        scan = data.reader.read_measured(frame)
         notices.warn(frame.name, model.spec.issues(scan))
         return with_columns(scan, extra_channels(model.channels))
 

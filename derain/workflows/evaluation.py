@@ -42,7 +42,7 @@ def beside_persistence(data: Taught, recording: Source) -> Answers:
     guard = Failures().skipping_failures
     for frame, judgement, _ in judgements(PersistenceDerainer(), shown, guard):
         if frame.key in taught:
-            rain = answer_of(data.read(taught[frame.key]), data.card) == RAIN
+            rain = answer_of(data.reader.read(taught[frame.key]), data.card) == RAIN
             labelled = judgement.scan.with_label(labels_of(judgement))
             found += Answers.of(labelled, TAUGHT_CARD, rain)
     return found
@@ -71,10 +71,10 @@ def evaluate_student(results: LearnResults, data: Taught, student: Student) -> N
     frames = evenly_spaced(data.frames("validation"), MOST_EVALUATED)
     results.agreement = Answers()
     for frame in tqdm(frames, "evaluating", disable=None):
-        scan = data.read_measured(frame)
+        scan = data.reader.read_measured(frame)
         results.agreement += Answers.of(scan, data.card, student(scan))
     for number, frame in enumerate(evenly_spaced(data.frames("validation"), DRAWN), 1):
-        scan = data.read(frame)
+        scan = data.reader.read(frame)
         picture = results.path.with_name(f"held_out_{number}.png")
         heading = f"{frame.key}, held out: cleaned by {results.student}"
         save(before_after_figure(scan, student(scan), heading), picture)

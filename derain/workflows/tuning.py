@@ -42,7 +42,7 @@ def bounds_of_rain(data: ScanData, frames: Sequence[Frame], inside: float) -> Ca
         InputError: A scan that cannot be read.
     """
     shown = tqdm(frames, desc="bounding rain", unit="scan", disable=None)
-    known = (data.card.known_points(data.read_measured(frame)) for frame in shown)
+    known = (data.card.known_points(data.reader.read_measured(frame)) for frame in shown)
     return fit_candidates(known, ("intensity",), inside)
 
 
@@ -81,7 +81,7 @@ def tune_filter_on(
     notices, default, neighbours = Notices(), filter_from(name, {}), neighbours_to_find(name)
     scans = {}
     for frame in tqdm(frames, desc="finding neighbours", unit="scan", disable=None):
-        scan = data.read_measured(frame)
+        scan = data.reader.read_measured(frame)
         notices.warn(frame.name, default.issues(scan))
         found = LabelledNeighbourhoods.of(scan, data.card, neighbours, threads, candidates)
         scans[frame.name] = found
@@ -112,7 +112,7 @@ def tune_model_on(name: str, data: ScanData, frames: Sequence[Frame], threads: i
         warn(note)
     scans = []
     for frame in tqdm(frames, desc="judging", unit="scan", disable=None):
-        scan = data.read_measured(frame)
+        scan = data.reader.read_measured(frame)
         known = scan.valid & ~data.card.unknown_of(scan)
         judgement = derainer.judge(scan)
         notices.warn(frame.name, derainer.issues(judgement))

@@ -41,7 +41,9 @@ def data(request, tmp_path) -> Folder:
 
 
 def test_extra_channels_are_measured_and_batched_for_a_model_that_names_them(data) -> None:
-    assert set(data.read(data.frames("train")[0]).fields) == set(COLUMNS)  # without a model: all
+    assert set(data.reader.read(data.frames("train")[0]).fields) == set(
+        COLUMNS
+    )  # without a model: all
     model = OutDet(channels=("x", "y", "z", "intensity", "rcs", "radar", "doppler"))
     agree_on_task(model, data)
     scans = [fused(number) for number in range(3)]

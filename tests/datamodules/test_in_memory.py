@@ -25,12 +25,12 @@ def test_scans_are_read_as_they_are_given_but_in_the_unit_of_the_card() -> None:
     frames = data.frames("train")
     assert [frame.key for frame in frames] == ["000000", "000001"]
     for number, frame in enumerate(frames):
-        scan, points = data.read(frame), scene(40, seed=number)
+        scan, points = data.reader.read(frame), scene(40, seed=number)
         np.testing.assert_array_equal(scan.xyz, points[:, :3])
         np.testing.assert_array_equal(scan.intensity, 2 * points[:, 3])
         np.testing.assert_array_equal(scan.label, labelled(number).label)
     (frame,) = data.frames("predict")
-    assert data.read(frame).label is None
+    assert data.reader.read(frame).label is None
     assert data.card is WADS
 
 

@@ -48,7 +48,7 @@ def mixture(**options: object) -> Mixture:
 def test_labels_are_read_by_the_card_of_their_part() -> None:
     data = mixture()
     for frame in data.source("train"):
-        scan = data.read(frame)
+        scan = data.reader.read(frame)
         own = SNOW if frame.key.startswith("snow/") else SPRAY
         before = scan.with_label(np.resize([0, 1, 2], 40))
         np.testing.assert_array_equal(data.card.rain_of(scan), own.rain_of(before))
@@ -99,7 +99,7 @@ def test_statistics_are_those_of_a_scan_that_is_drawn() -> None:
 def test_each_part_is_read_in_its_own_unit() -> None:
     data = Mixture({"one": part(SNOW), "two": part(SNOW, intensity_scale=100.0)})
     frames = data.source("train")
-    one, two = data.read(frames[0]), data.read(frames[4])
+    one, two = data.reader.read(frames[0]), data.reader.read(frames[4])
     np.testing.assert_allclose(two.intensity, 100 * one.intensity, rtol=1e-6)
     data.complete_card()
     mean = np.mean([s.intensity for s in scans(4, [0])])

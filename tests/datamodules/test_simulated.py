@@ -32,7 +32,7 @@ def test_a_data_set_is_made_once_and_labelled(data) -> None:
     assert {file: file.stat().st_mtime_ns for file in data.root.rglob("*")} == made
     assert again.split == {part: [*names] for part, names in data.split.items()}
     assert [len(again.frames(part)) for part in ("train", "validation")] == [2, 1]
-    assert again.read(again.frames("train")[0]).label is not None
+    assert again.reader.read(again.frames("train")[0]).label is not None
     with pytest.raises(InputError, match="no sequences are named for test"):
         again.frames("test")
 

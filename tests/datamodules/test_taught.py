@@ -55,7 +55,7 @@ def test_the_ends_of_sequences_are_held_out(root) -> None:
 def test_scans_are_read_with_the_teachers_labels_and_as_it_saw_them(root) -> None:
     data = Taught(str(root))
     frames = data.frames("train")
-    scan = data.read(frames[1])
+    scan = data.reader.read(frames[1])
     teacher = Between()
     answers = [teacher.push(frame.without_labels()) for frame in frames[:3]]
     np.testing.assert_array_equal(scan.intensity, 2 * scene(POINTS, 2)[:, 3])

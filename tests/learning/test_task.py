@@ -62,7 +62,7 @@ def test_columns_are_those_that_the_model_names() -> None:
     data = InMemory(scans(2, echo=column, ring=column), card=CARD)
     task = agree_on_task(OutDet(channels=("x", "y", "z", "echo")), data)
     assert task.columns == ("echo",)
-    assert set(data.read(data.frames("train")[0]).fields) == {"echo"}
+    assert set(data.reader.read(data.frames("train")[0]).fields) == {"echo"}
     assert task.spec.mean[3] == column.mean()
     assert agree_on_task(OutDet(), InMemory(scans(2, echo=column), card=CARD)).columns == ()
 

@@ -141,7 +141,7 @@ def test_a_network_of_candidates_learns_from_them_and_judges_them_alone(
     shares = [1 - candidates.rain_share, candidates.rain_share]
     assert torch.equal(model.class_weight, class_weights(shares))
     (batch,) = data.val_dataloader()
-    scan = data.read(data.frames("validation")[0])
+    scan = data.reader.read(data.frames("validation")[0])
     among = candidates.among(scan)
     assert 0 < batch.cells[0] == among.sum() < 300
     assert batch.target.sum() == (scan.label[among] == RAIN).sum()

@@ -54,7 +54,7 @@ def files(tmp_path) -> Folder:
 def memory(files) -> InMemory:
     """What the files hold."""
     parts = ("train", "validation", "test")
-    scans = ([files.read(frame) for frame in files.frames(part)] for part in parts)
+    scans = ([files.reader.read(frame) for frame in files.frames(part)] for part in parts)
     return InMemory(*scans, card="wads", loading=LOADING)
 
 

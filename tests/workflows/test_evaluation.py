@@ -30,7 +30,7 @@ def test_persistence_sees_the_scans_around_those_held_out(tmp_path) -> None:
     ]
     assert [*answers.table.sum(axis=(0, 2))[[NOT_KNOWN, RAIN]]] == expected
     assert min(expected) > 0
-    by_teacher = [data.card.rain_of(data.read(frame)) for frame in data.frames("validation")]
+    by_teacher = [data.card.rain_of(data.reader.read(frame)) for frame in data.frames("validation")]
     assert answers.table[..., 1].sum() == sum(rain.sum() for rain in by_teacher)
     before_held_out = recording[len(whole) - len(held_out) - 1]
     Path(before_held_out.name).write_bytes(b"damaged")
