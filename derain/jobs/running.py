@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError
 from contextlib import suppress
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar, cast
 
@@ -213,7 +212,6 @@ class Task(Generic[UnitT, ResultT]):
             inputs=unit.inputs,
             options=self.job.fingerprint,
             worker=f"{platform.node()}-{os.getpid()}",
-            ended=datetime.now(UTC).isoformat(timespec="seconds"),
             seconds=round(seconds, 3),
             errors=[[str(error.subject), error.reason, error.remedy] for error in errors],
             results=[each.to_json() for each in results if each.error is None],

@@ -31,7 +31,6 @@ class Record:
         inputs: Fingerprint of its inputs.
         options: Fingerprint of the options of its job.
         worker: Host and number of the process.
-        ended: Its end, in ISO 8601, by the clock of its worker.
         seconds: Duration, seconds.
         errors: Errors, with subject, reason and remedy each; empty without errors.
         results: Results, in the form of the job.
@@ -41,7 +40,6 @@ class Record:
     inputs: str
     options: str
     worker: str
-    ended: str
     seconds: float
     errors: list[list[str]]
     results: list[Any]
