@@ -19,7 +19,7 @@ resumes, and `derain status` prints its progress.
   derain info REHEARSE3D_PUBLIC --picture statistics.png
   derain info WADS --json
   derain info drives/ --out counts --workers 8
-  derain info my_data --layout lidar,classes --card my_card.yaml
+  derain info my_data --card my_card.yaml
 """
 
 import argparse
@@ -69,11 +69,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--card",
         help="data card with the classes and folders of a data set (default: found by its folders)",
-    )
-    parser.add_argument(
-        "--layout",
-        metavar="SCANS,LABELS",
-        help="names of a sequence's folders of scans and labels (default: known names)",
     )
     parser.add_argument("--picture", type=Path, help="draw a folder's statistics to this PNG file")
     group = parser.add_argument_group("a folder of many scans")
@@ -172,8 +167,8 @@ def _describe_folder(folder: Path, arguments: argparse.Namespace) -> None:
     print_lines(json.dumps(facts.as_dict()) if arguments.json else facts.as_text())
     if arguments.card is not None and not facts.total.labelled:
         warn(
-            f"{folder}: no labels are beside its scans or in a folder that the card names. Name "
-            f"the folders of scans and labels, as in --layout {folder.absolute().name},labels"
+            f"{folder}: no labels are beside its scans or in a folder that the card names: "
+            f"`layout: {{scans: {folder.absolute().name}, labels: FOLDER}}` in a YAML card names it"
         )
     if arguments.picture:
         draw(facts, arguments.picture)

@@ -2,7 +2,7 @@
 
 import argparse
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -10,7 +10,7 @@ from derain.cards.card import DataCard, load_card
 from derain.cards.known import card_by_folders, layouts_for
 from derain.cards.layout import Layout
 from derain.cli.unit_options import shard_of
-from derain.errors import InputError, counted
+from derain.errors import counted
 from derain.evaluation.contents import (
     Contents,
     FrameCounting,
@@ -129,7 +129,7 @@ def facts_of_folder(
         division = Division(shard=shard_of(arguments), anew=arguments.anew)
     card = None if arguments.card is None else load_card(arguments.card)
     layouts = layouts_for(card)
-    layout = _layout(folder, card, arguments.layout)
+    layout = find_layout(folder, layouts)
     folders = None if layout is None else [layout.scans, layout.labels]
     card, rests_on = (card, "--card") if card else _card(folder, layout)
     sequences = find_sequences(folder, layout, arguments.columns, layouts)
@@ -175,18 +175,6 @@ def draw(facts: FolderFacts, picture: Path) -> None:
     scans = counted(total.scans, "scan")
     title = f"{facts.folder.absolute().name}: {scans}, {total.points:,} points"
     save(statistics_figure(facts.by_rain_rate, facts.classes, title), picture)
-
-
-def _layout(folder: Path, card: DataCard | None, stated: str | None) -> Layout | None:
-    """The layout of a folder: as stated, by its data card, or by the names of its folders."""
-    if stated is None:
-        return find_layout(folder, layouts_for(card))
-    folders = stated.split(",")
-    if len(folders) != 2:
-        reason = f"'{stated}' does not name two folders"
-        raise InputError("--layout", reason, "Give e.g. velodyne,labels.")
-    scans, labels = folders
-    return replace(card.layout if card else Layout(), scans=scans, labels=labels)
 
 
 def _card(folder: Path, layout: Layout | None) -> tuple[DataCard | None, CardRestsOn]:

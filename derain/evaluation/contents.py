@@ -9,7 +9,6 @@ from typing import Any, Self
 import numpy as np
 
 from derain.cards.layout import Layout
-from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS
 from derain.files.names import scan_stem
 from derain.jobs.running import ValueWork
@@ -89,7 +88,7 @@ def find_sequences(
     Args:
         root: A folder with a folder of sequences, the folder of sequences, a sequence, its folder
             of scans, or any folder of scans, which counts as one sequence.
-        layout: Names of the folders; None for a folder of scans, or of recordings.
+        layout: Names of its folders; None for a folder of scans, or of recordings.
         columns: Names of the columns of files that do not name them.
         layouts: Names of the folders of recordings that may be sequences of data sets; by default
             those in the packaged data cards.
@@ -104,16 +103,9 @@ def find_sequences(
     if layout is None:
         recordings = recordings_of(named_frames(root, columns, labelled=True, layouts=layouts))
         return [(Frames(each), None) for each in recordings]
-    folders = scan_folders(root, layout)
-    if not folders:
-        raise InputError(
-            root,
-            f"no sequence in it has a folder {layout.scans}",
-            "Name its folders with --layout.",
-        )
     rates = manifest_of(root).get(RAIN_RATE, {})
     sequences: list[tuple[Source, float | None]] = []
-    for folder in folders:
+    for folder in scan_folders(root, layout):
         name = folder.absolute().parent.name
         scans = listed_scans([folder])
         keys = [f"{name}/{scan_stem(scan)}" for scan in scans]

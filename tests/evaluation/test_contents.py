@@ -9,7 +9,6 @@ import pytest
 from matplotlib.colors import to_rgba
 
 from derain.cards.layout import Layout
-from derain.errors import InputError
 from derain.evaluation.contents import Contents, FrameCounting, find_sequences, rate_name
 from derain.evaluation.hard_cases import scene
 from derain.files import write_scan
@@ -39,8 +38,6 @@ def test_a_folder_of_scans_is_one_sequence_and_other_folders_have_to_be_named(tm
     assert find_layout(tmp_path) is None
     ((frames, _),) = find_sequences(tmp_path, OTHERS)
     assert (frames[0].sequence, frames[0].key) == ("drive", "drive/0")
-    with pytest.raises(InputError, match="no sequence in it has a folder velodyne"):
-        find_sequences(tmp_path, Layout())
 
 
 def test_the_manifest_states_rain_rates(tmp_path) -> None:
