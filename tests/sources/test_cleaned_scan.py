@@ -26,7 +26,7 @@ def record(unit: str, *scans: tuple[float | None, int]) -> Record:
         }
         for seconds, drops in scans
     ]
-    return Record(unit, "", "", "", "", 1.0, [], results)
+    return Record(unit, "", "", "", 1.0, [], results)
 
 
 @pytest.mark.parametrize(
