@@ -164,12 +164,12 @@ class Job:
     def _record_of(self, unit: Unit, content: bytes | None) -> Record | None:
         try:
             written = json.loads(content or b"")
-            checksum = written.pop("checksum", None)  # derain 0.2 wrote none
+            checksum = written.pop("checksum")
             record = Record(**written)
-        except (AttributeError, TypeError, ValueError):  # none, damaged, or of another version
+        except (AttributeError, LookupError, TypeError, ValueError):  # none, damaged, or of another version
             return None
         unchanged = (unit.inputs, self.fingerprint) == (record.inputs, record.options)
-        return record if unchanged and checksum in (None, _checksum(written)) else None
+        return record if unchanged and checksum == _checksum(written) else None
 
     @property
     def _documents(self) -> Documents:

@@ -82,15 +82,6 @@ def test_a_record_that_was_changed_by_hand_is_none(out) -> None:
     assert [tries(out, unit.id) for unit in UNITS] == [1, 2, 1, 1, 1]
 
 
-def test_a_record_of_derain_02_which_has_no_checksum_counts(out) -> None:
-    results(out, Counting(out))
-    for path in (out / ".derain" / "units").rglob("*.json"):
-        record = json.loads(path.read_bytes())
-        del record["checksum"]
-        path.write_text(json.dumps(record))
-    assert job_status(out, lambda record: None).done == len(UNITS)
-
-
 def test_other_options_are_refused_and_named(out) -> None:
     results(out, Counting(out))
     with pytest.raises(InputError, match="size was 3 and is 4"):
