@@ -164,9 +164,9 @@ class Job:
     def _record_of(self, unit: Unit, content: bytes | None) -> Record | None:
         try:
             written = json.loads(content or b"")
-            checksum = written.pop("checksum")
+            checksum = written.pop("checksum", None)
             record = Record(**written)
-        except (AttributeError, LookupError, TypeError, ValueError):  # none, damaged, or of another version
+        except (AttributeError, TypeError, ValueError):  # none, damaged, or of another version
             return None
         unchanged = (unit.inputs, self.fingerprint) == (record.inputs, record.options)
         return record if unchanged and checksum == _checksum(written) else None
