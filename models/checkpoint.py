@@ -10,6 +10,7 @@ from typing import Any
 
 import lightning
 import torch
+from lightning.fabric.utilities.cloud_io import get_filesystem
 from lightning.pytorch.plugins.io import TorchCheckpointIO
 from torch import Tensor
 
@@ -21,7 +22,7 @@ from derain.learning.start import Start
 from derain.models.base import DerainingModule
 from derain.models.callbacks.resumption import LARGEST_COUNT, REMEDY
 from derain.models.limits import check_hyperparameters
-from derain.models.published import LOAD_ERRORS, read_checkpoint, with_tensors
+from derain.models.published import LOAD_ERRORS, read_checkpoint, unpickled, with_tensors
 from derain.models.registry import NETWORKS
 from derain.spec import Spec
 
@@ -177,7 +178,8 @@ class WholeCheckpoints(TorchCheckpointIO):
             InputError: A missing file, or one that holds anything else.
         """
         if "://" in str(path):
-            return super().load_checkpoint(path, *arguments, **options)
+            with get_filesystem(path).open(str(path), "rb") as file:
+                return unpickled(file, str(path))
         return read_checkpoint(Path(path))
 
 

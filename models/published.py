@@ -82,23 +82,36 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
         InputError: A missing file, or one that holds anything else.
     """
     with reading(path), path.open("rb") as file:
-        try:
-            _refuse_compressed(file)
-            placeholders = [(Placeholder, name) for name in TRAINER_STATE]
-            with (
-                safe_globals([dict, defaultdict, *placeholders]),
-                warnings.catch_warnings(action="ignore"),  # torch also warns of what it refuses
-            ):
-                content = torch.load(file, map_location="cpu", weights_only=True)
-        except Exception as error:  # torch.load raises what its parts raise, zip's own included
-            # Not in torch's words, which advise to load it all the same.
-            raise InputError(
-                path,
-                "damaged, or holds more than tensors and plain values",
-                "Give a checkpoint or a state_dict.",
-            ) from error
+        return unpickled(file, path)
+
+
+def unpickled(file: BinaryIO, name: Path | str) -> dict[str, Any]:
+    """Unpickles a checkpoint as :func:`read_checkpoint` does.
+
+    Args:
+        file: The checkpoint, open.
+        name: Its path or address, for errors.
+
+    Raises:
+        InputError: It holds anything else.
+    """
+    try:
+        _refuse_compressed(file)
+        placeholders = [(Placeholder, state) for state in TRAINER_STATE]
+        with (
+            safe_globals([dict, defaultdict, *placeholders]),
+            warnings.catch_warnings(action="ignore"),  # torch also warns of what it refuses
+        ):
+            content = torch.load(file, map_location="cpu", weights_only=True)
+    except Exception as error:  # torch.load raises what its parts raise, zip's own included
+        # Not in torch's words, which advise to load it all the same.
+        raise InputError(
+            name,
+            "damaged, or holds more than tensors and plain values",
+            "Give a checkpoint or a state_dict.",
+        ) from error
     if not isinstance(content, dict):
-        raise InputError(path, f"holds a {type(content).__name__}", "Give a checkpoint.")
+        raise InputError(name, f"holds a {type(content).__name__}", "Give a checkpoint.")
     return with_current_names(content)
 
 

@@ -238,7 +238,10 @@ def test_weights_that_are_not_finite_take_no_checkpoints_place(tmp_path) -> None
     assert path.read_bytes() == b"the last good one"
 
 
-def test_an_address_is_left_to_lightning() -> None:
+def test_a_checkpoint_at_an_address_is_not_trusted_either() -> None:
     checkpoints = WholeCheckpoints()
     checkpoints.save_checkpoint({"epoch": 3}, "memory://runs/model.ckpt")
     assert checkpoints.load_checkpoint("memory://runs/model.ckpt") == {"epoch": 3}
+    checkpoints.save_checkpoint({"epoch": Path("3")}, "memory://runs/model.ckpt")
+    with pytest.raises(InputError, match=r"memory://runs/model\.ckpt: .*more than tensors"):
+        checkpoints.load_checkpoint("memory://runs/model.ckpt", weights_only=False)
