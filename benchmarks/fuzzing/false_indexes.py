@@ -69,6 +69,18 @@ def chunks_times(number: int) -> Callable[[list[McapRecord]], list[McapRecord]]:
     return change
 
 
+def chunks_longer_by(number: int) -> Callable[[list[McapRecord]], list[McapRecord]]:
+    """A summary that states so many more bytes of each chunk."""
+
+    def change(records: list[McapRecord]) -> list[McapRecord]:
+        for each in records:
+            if isinstance(each, ChunkIndex):
+                each.chunk_length += number
+        return records
+
+    return change
+
+
 def without_a_chunk(records: list[McapRecord]) -> list[McapRecord]:
     """A summary that lacks the last chunk, and states as many messages as are left."""
     left_out = [each for each in records if _is_chunk(each)][-1]

@@ -8,14 +8,17 @@ Source: the MCAP specification, version 0 (https://mcap.dev/spec).
 
 import heapq
 import os
+from array import array
 from collections import Counter, defaultdict
 from collections.abc import Collection, Container, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import numpy as np
 from mcap.opcode import Opcode
 from mcap.reader import FOOTER_SIZE
 from mcap.records import (
@@ -96,7 +99,10 @@ class McapFile:
         self.profile: str = self._read(len(MAGIC), Header).profile
         footer_at = end - FOOTER_SIZE
         summary = defaultdict[type, list[Any]](list)
-        for record in self._records(self._read(footer_at, Footer).summary_start or footer_at):
+        summary_at = self._read(footer_at, Footer).summary_start or footer_at
+        if summary_at > footer_at:
+            raise ValueError("its summary is in the wrong place")
+        for record in self._records(summary_at):
             summary[type(record)].append(record)
         schemas = {each.id: each for each in summary[Schema]}
         self.connections = {
@@ -105,8 +111,13 @@ class McapFile:
         # By their places, for what is named twice would be read again and again.
         chunks = {each.chunk_start_offset: each for each in summary[ChunkIndex]}
         self.chunks: list[ChunkIndex] = [chunks[offset] for offset in sorted(chunks)]
-        self._others = {each.offset: Attachment for each in summary[AttachmentIndex]}
-        self._others |= {each.offset: Metadata for each in summary[MetadataIndex]}
+        self._others = {each.offset: (Attachment, each) for each in summary[AttachmentIndex]}
+        self._others |= {each.offset: (Metadata, each) for each in summary[MetadataIndex]}
+        spans = [(each.chunk_start_offset, each.chunk_length) for each in self.chunks]
+        spans += [(offset, each.length) for offset, (_, each) in self._others.items()]
+        for (offset, length), (following, _) in pairwise(sorted(spans)):
+            if offset + length > following:
+                raise ValueError("records of its index overlap")
         if not summary[Statistics]:
             raise ValueError("it has no index")
         self.statistics: Statistics = summary[Statistics][0]
@@ -146,8 +157,8 @@ class McapFile:
         Raises:
             ValueError: The index names a place that has none.
         """
-        for offset, kind in self._others.items():
-            yield self._read(offset, kind)
+        for offset, (kind, index) in self._others.items():
+            yield self._read(offset, kind, index.length)
 
     def _records(self, offset: int) -> Iterator[Any]:
         """Records from a place on; chunks are not unpacked."""
@@ -157,15 +168,21 @@ class McapFile:
         )
         return reader.records
 
-    def _read(self, offset: int, kind: type) -> Any:
+    def _read(self, offset: int, kind: type, length: int | None = None) -> Any:
         """The record at a place.
 
+        Args:
+            offset: The place.
+            kind: Its kind.
+            length: The most bytes that it may have; None for any number.
+
         Raises:
-            ValueError: One of another kind.
+            ValueError: One of another kind, or a longer one.
         """
         record = next(self._records(offset))
-        if not isinstance(record, kind):
-            raise ValueError(f"it has no {kind.__name__.lower()} at byte {offset:,}")
+        is_longer = length is not None and self._file.tell() > offset + length
+        if is_longer or not isinstance(record, kind):
+            raise ValueError(f"it has no {kind.__name__.lower()} at byte {offset:,} as indexed")
         return record
 
     def _in_chunk(
@@ -173,7 +190,7 @@ class McapFile:
     ) -> Iterator[tuple[int, Message | None]]:
         """Time and message; the first is None, so that no chunk is unpacked before its time."""
         yield index.message_start_time, None
-        chunk = self._read(index.chunk_start_offset, Chunk)
+        chunk = self._read(index.chunk_start_offset, Chunk, index.chunk_length)
         size = chunk.uncompressed_size
         check_size(size)
         self._held += size
@@ -195,22 +212,24 @@ class McapFile:
         self, channels: Container[int], start: int
     ) -> Iterator[tuple[int, Message | None]]:
         """Time and message of a file without chunks."""
-        for time, offset in self._places:
-            if time >= start:
-                message = self._read(offset, Message)
+        times, offsets = self._places
+        for place in np.argsort(times, kind="stable"):
+            if times[place] >= start:
+                message = self._read(offsets[place], Message)
                 if message.channel_id in channels:
-                    yield time, message
+                    yield message.log_time, message
 
     @cached_property
-    def _places(self) -> list[tuple[int, int]]:
+    def _places(self) -> tuple["array[int]", "array[int]"]:
         """Time and offset of each message of a file without chunks, which has no index of them."""
-        found = []
+        times, offsets = array("Q"), array("Q")
         for record in self._records(len(MAGIC)):
             if isinstance(record, Message):
-                found.append((record.log_time, self._file.tell() - len(record.data) - MESSAGE_HEAD))
+                times.append(record.log_time)
+                offsets.append(self._file.tell() - len(record.data) - MESSAGE_HEAD)
             elif isinstance(record, DataEnd):
                 break
-        return sorted(found)
+        return times, offsets
 
 
 class McapReader:

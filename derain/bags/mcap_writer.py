@@ -88,9 +88,13 @@ class McapWriter:
     def _written_metadata(self, old: Ros2Metadata) -> Ros2Metadata:
         """The metadata of this bag: that of the other, with what differs."""
         file = Path(self._file.name).name
-        span = {key: old.content[key] for key in ("starting_time", "duration")}
+        span = {
+            "starting_time": {"nanoseconds_since_epoch": self.bag.start_time},
+            "duration": {"nanoseconds": self.bag.duration},
+        }
         count = {"message_count": self._counts.total()}
         content = old.content | {
+            **span,
             **count,
             "compression_format": "",
             "compression_mode": NONE,

@@ -59,6 +59,8 @@ class Ros2Metadata:
             packing = str(content.get("compression_format") or "")
             for topic in content["topics_with_message_count"]:
                 int(topic["message_count"]), topic["topic_metadata"]["name"]
+        except KeyError as error:
+            raise ValueError(f"its {BAG_METADATA} lacks {error}") from error
         except Exception as error:  # PyYAML has many
             raise ValueError(f"its {BAG_METADATA} is damaged: {reason_of(error)}") from error
         if version > NEWEST_VERSION:

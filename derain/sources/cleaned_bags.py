@@ -205,10 +205,10 @@ class CleanedBags:
                 raise InputError(
                     option,
                     f"{name!r} is not a name of a topic",
-                    "Join words of letters, digits and _ by /, such as /points_clean.",
+                    "Join words that begin with a letter by /, such as /points_clean.",
                 )
             if name in names:
-                raise InputError(option, f"{target} has a topic {name} already", "Name another.")
+                raise InputError(option, f"there is a topic {name} already", "Name another.")
             names.add(name)
 
 

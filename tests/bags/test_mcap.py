@@ -11,6 +11,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 from small_bags import copied, tables
 
 from benchmarks.fuzzing.false_indexes import (
+    chunks_longer_by,
     chunks_times,
     stating,
     with_summary,
@@ -146,6 +147,8 @@ def test_a_file_without_a_whole_index_is_refused(tmp_path, options) -> None:
         (stating(10**15), "messages are stated in"),
         (chunks_times(50), "its index"),
         (without_a_chunk, "of 12 messages"),
+        (chunks_longer_by(10**5), "overlap"),
+        (chunks_longer_by(-1), "as indexed"),
     ],
 )
 def test_a_summary_that_differs_from_the_data_is_refused(tmp_path, change, reason) -> None:

@@ -253,7 +253,7 @@ NAMES = ["a b", "/a\nb", "/a//b", "/é", ""]  # that no topic may have
     ("out", "options", "reason"),
     [
         *[("out", ("--cleaned-topic", name), "is not a name of a topic") for name in NAMES],
-        ("out", ("--cleaned-topic", "/imu/data"), "has a topic /imu/data already"),
+        ("out", ("--cleaned-topic", "/imu/data"), "a topic /imu/data already"),
         ("drive/cleaned", (), "is inside"),
         ("mine", (), "exists, and is not a bag"),
         ("", (), "would overwrite"),
