@@ -199,8 +199,8 @@ def _campaign(options: argparse.Namespace) -> Campaign | WorldCampaign:
     """The campaign to simulate: sequences of tracks, or scans of worlds."""
     if options.world is not None:
         return WorldCampaign(*partition(options.sequences), seed=options.seed, world=options.world)
-    moves = options.speed, options.traffic, options.skew
-    radar = not any(moves) if options.radar is None else options.radar
+    moves = bool(options.speed or options.traffic)
+    radar = not moves if options.radar is None else options.radar
     return Campaign(
         *partition(options.sequences),
         scans=options.scans,
@@ -209,7 +209,7 @@ def _campaign(options: argparse.Namespace) -> Campaign | WorldCampaign:
         sensor=options.sensor or "mems_256",
         layout=options.layout,
         radar=Radar() if radar else None,
-        drive=Drive(*moves) if any(moves) else None,
+        drive=Drive(options.speed, options.traffic, options.skew) if moves else None,
     )
 
 

@@ -180,9 +180,14 @@ class Campaign(SplitSequences):
         if self.drive is None:
             return
         length = self.drive.speed * self.times[-1]
-        if self.layout != "street" or self.radar is not None or length > LONGEST:
-            reason = f"needs the layout street, no radar, and {LONGEST:,.0f} m or less"
-            raise InputError("drive", reason, "Change what differs.")
+        too_long = f"{length:,.0f} m of street are more than {LONGEST:,.0f}"
+        for is_wrong, reason, remedy in (
+            (self.layout != "street", f"a {self.layout} has none", "Take the layout street."),
+            (self.radar is not None, "has no radar", "Leave the radar out."),
+            (length > LONGEST, too_long, "Simulate more sequences of fewer scans."),
+        ):
+            if is_wrong:
+                raise InputError("drive", reason, remedy)
 
     @property
     def lidar(self) -> Sensor:

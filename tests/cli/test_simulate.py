@@ -119,10 +119,10 @@ def test_columns_and_a_picture(succeed, tmp_path, saved_figures) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--speed", "13"], "drive: needs the layout street, no radar"),
+        (["--speed", "13"], "drive: a facility has none"),
         (
             ["--speed", "13", "--layout", "street", "--radar"],
-            "drive: needs the layout street, no radar",
+            "drive: has no radar",
         ),
         (["--speed", "13", "--on", "."], "--speed: works only without --on"),
         (["--rain", "-1"], "rain: nominal: -1.0 is impossible. Give 0 to 2,000."),

@@ -52,7 +52,7 @@ def test_sequences_are_parted_as_those_of_rehearse_3d() -> None:
         (Campaign, {"layout": "moon"}, "layout: 'moon' .*street"),
         (Campaign, {"drive": Drive(13), "layout": "facility"}, "drive: .*street"),
         (Campaign, {"drive": Drive(13), "radar": Radar()}, "drive: .*radar"),
-        (Campaign, {"drive": Drive(13), "scans": 2000}, "drive: .*2,000 m"),
+        (Campaign, {"drive": Drive(13), "scans": 2000}, "drive: .*2,000"),
         (Drive, {"speed": -1.0}, "speed: -1.0 "),
         (Drive, {"speed": math.nan}, "speed: nan "),
         (Drive, {"traffic": -1}, "traffic: -1 "),

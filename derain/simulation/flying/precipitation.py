@@ -237,9 +237,12 @@ def kinds_of(entry: Entry) -> dict[str, Kind]:
             ``snow: {weight: 2, number: [10, 100]}``. Kinds that are left out are never drawn.
 
     Raises:
-        InputError: No such kind or attribute, or a value that it cannot have.
+        InputError: No such kind or attribute, a value that it cannot have, or no weight at all.
     """
-    return entry.record({name: kind.changed for name, kind in KINDS.items()})
+    kinds: dict[str, Kind] = entry.record({name: kind.changed for name, kind in KINDS.items()})
+    if not any(kind.weight for kind in kinds.values()):
+        raise entry.fault("no kind has a weight", "Give one kind a weight.")
+    return kinds
 
 
 def draw_precipitation(kinds: Mapping[str, Kind], generator: Generator) -> Precipitation:
