@@ -4,6 +4,7 @@ Source: Greg Turk, "The PLY Polygon File Format", version 1.0, Stanford Universi
 """
 
 import re
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -142,7 +143,7 @@ def _parse(content: bytes) -> tuple[PlyHeader, Array]:
         raise ValueError("the vertices have no properties")
     row = vertex.row(encoding)
     if encoding == "ascii":
-        table = parse_rows(data, row, vertex.count)
+        table = parse_rows(data, row, min(vertex.count, sys.maxsize))
     else:
         table = np.frombuffer(data, row, min(len(data) // row.itemsize, vertex.count))
     if len(table) < vertex.count:
