@@ -266,9 +266,9 @@ class _Printer:
             print_lines(f"{self._example} {look}", self._stream)
 
     def so_far(self, scans: int) -> str:
-        """Number of scans that are cleaned, of a number of scans."""
-        count = f"{self.cleaned:,} of {scans:,} scans are cleaned"
-        return f"{count}; a bag is written when all of its clouds are"
+        """Number of scans that are written, of a number of scans."""
+        count = f"{self.cleaned:,} of {scans:,} scans are written"
+        return f"{count} (clouds of a bag, when all of it is cleaned)"
 
     def take(self, outcome: ScanOutcome) -> None:
         """Prints the warnings and the results of a scan, or its error, and adds a row."""
