@@ -176,6 +176,7 @@ class WholeCheckpoints(TorchCheckpointIO):
 
         Raises:
             InputError: A missing file, or one that holds anything else.
+            OSError: An address that cannot be read.
         """
         if "://" in str(path):
             with get_filesystem(path).open(str(path), "rb") as file:

@@ -15,6 +15,9 @@ from derain.system.extras import OPENVINO
 
 DEVICE = "CPU"
 
+# The package by which OpenVINO reports that it was imported.
+TELEMETRY = "openvino_telemetry"
+
 # OpenVINO's name of a precision, and the capability of a processor that it needs. For bfloat16 on a
 # processor without it, OpenVINO imitates it with AVX-512, which takes twice as long as float32, and
 # with AVX2 computes in float32 without notice.
@@ -90,9 +93,10 @@ def _type_of(port: Any) -> TensorType:
 def import_openvino() -> Any:
     """Imports OpenVINO where it is needed; nothing else in derain imports it.
 
-    The package openvino-telemetry cannot be imported in this process from then on. OpenVINO depends
-    on it and, with it in place, reports every import of itself over the network unless the user has
-    opted out; without it OpenVINO is content with a stub.
+    The package openvino-telemetry is kept from being imported meanwhile. OpenVINO depends on it
+    and, with it in place, reports every import of itself over the network unless the user has opted
+    out; without it OpenVINO is content with a stub. Whoever has imported it before has it back
+    afterwards.
 
     Returns:
         The module openvino.
@@ -103,5 +107,16 @@ def import_openvino() -> Any:
 
     Source: openvino/tools/ovc/__init__.py of OpenVINO 2026.4.1, which sends "general_import".
     """
-    sys.modules["openvino_telemetry"] = None  # type: ignore[assignment]  # an ImportError
-    return OPENVINO.load("this runtime")
+    former = {name: module for name, module in sys.modules.items() if _is_telemetry(name)}
+    for name in former:
+        del sys.modules[name]
+    sys.modules[TELEMETRY] = None  # type: ignore[assignment]  # importing it is an ImportError
+    try:
+        return OPENVINO.load("this runtime")
+    finally:
+        del sys.modules[TELEMETRY]
+        sys.modules.update(former)
+
+
+def _is_telemetry(name: str) -> bool:
+    return name == TELEMETRY or name.startswith(f"{TELEMETRY}.")
