@@ -54,7 +54,7 @@ class Shard:
         Raises:
             InputError: Other text, or no such shard.
         """
-        match = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", text, re.ASCII)
+        match = re.fullmatch(r"([0-9]{1,9})/([1-9][0-9]{0,8})", text, re.ASCII)
         if match is None:
             raise InputError("--shard", f"{text} is not I/N", "Give for instance 0/4.")
         return cls(int(match[1]), int(match[2]))

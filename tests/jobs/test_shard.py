@@ -66,7 +66,7 @@ def test_tasks_that_are_run_again_do_the_shards_that_the_job_was_begun_in() -> N
 def test_a_shard_that_is_not_there_is_refused() -> None:
     with pytest.raises(InputError, match=r"no shard 4.*0 to 3"):
         Shard.of_text("4/4")
-    for text in ("4", "a/b", "-1/4", "1/0x4"):
+    for text in ("4", "a/b", "-1/4", "1/0x4", "0/0"):
         with pytest.raises(InputError, match="I/N"):
             Shard.of_text(text)
 
