@@ -155,11 +155,14 @@ class CleanSink:
                 yield frame, broken[frame.clouds]
 
     def _is_among_scans(self, folder: Path) -> bool:
-        """True if a folder without scans of its own lies in the one that holds all scans."""
-        scans = [frame.path.absolute() for frame in self._source if isinstance(frame, FileFrame)]
-        if not scans or any(scan.is_relative_to(folder.absolute()) for scan in scans):
+        """True if a folder without scans of its own lies in the one that the scans were found in."""
+        place = folder.absolute()
+        scans = [frame for frame in self._source if isinstance(frame, FileFrame)]
+        if any(scan.path.absolute().is_relative_to(place) for scan in scans):
             return False
-        return folder.absolute().is_relative_to(os.path.commonpath(scans))
+        # A key is the path of its scan from the folder that was searched.
+        roots = {scan.path.absolute().parents[: scan.key.count("/") + 1][-1] for scan in scans}
+        return any(place.is_relative_to(root) for root in roots)
 
     def _is_in_bag(self, frame: Frame) -> bool:
         return frame in self._stored_bags or self._bags.takes(frame)

@@ -41,7 +41,7 @@ def test_a_name_and_a_filter_alone_are_no_methods(tmp_path, given) -> None:
 def test_results_among_the_recordings_are_none_to_a_later_run(tmp_path, keeps) -> None:
     drives = tmp_path / "drives"
     for name in "ab":
-        write_scenes(drives / name, 200, 200)
+        write_scenes(drives / "monday" / name, 200, 200)
     source = derain.named_frames(drives)
     dror, division = derain.FilterDerainer(derain.DROR()), derain.Division(keep_records=keeps)
     with derain.CleanSink(drives / "out/clean", source, removed=drives / "out/rain") as sink:
