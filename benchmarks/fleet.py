@@ -229,8 +229,8 @@ def kill_once(
         try:
             client.wait(3 * seconds[WAY_OF[victim]] + 60)
         except subprocess.TimeoutExpired:
-            print(f"{victim}: the client goes on for ever", file=sys.stderr)
             client.kill()
+            raise
         end_session(client.pid, NOTICE)
     return in_time
 

@@ -1,9 +1,12 @@
 """The workers of a Dask cluster as an executor."""
 
 import json
+import logging
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError, wait
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -15,6 +18,12 @@ from derain.system.notices import warn
 
 # Seconds after which a scheduler that does not answer is not there.
 PATIENCE = 30
+
+# Loggers of the library that print tracebacks if a scheduler is gone, which one error names.
+LOGGERS = ("distributed", "distributed.client", "tornado", "tornado.application")
+
+# Seconds between two looks at whether the scheduler is still there.
+BETWEEN_LOOKS = 5
 
 
 @contextmanager
@@ -38,9 +47,56 @@ def dask_executor(address: str) -> Iterator[Submits]:
             f"no scheduler answers at {address} ({error})",
             "Start one by `dask scheduler`, and give the address that it prints.",
         ) from error
+    for logger in LOGGERS:
+        logging.getLogger(logger).setLevel(logging.CRITICAL)
     with client:
         _refuse_other_versions(client)
-        yield client.get_executor(pure=False)
+        yield Workers(client)
+
+
+class Workers:
+    """An executor of a client's workers.
+
+    Args:
+        client: The client.
+    """
+
+    def __init__(self, client: Any) -> None:
+        self._client = client
+        self._executor = client.get_executor(pure=False)
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> "Work":
+        """Has a worker call a function."""
+        return Work(self._executor.submit(function, *arguments), self._client)
+
+
+@dataclass(frozen=True)
+class Work:
+    """A call by a worker, which ends with the scheduler: the library's future may wait for ever.
+
+    Attributes:
+        future: The library's future.
+        client: The client.
+    """
+
+    future: Any
+    client: Any
+
+    def done(self) -> bool:
+        """True if it is known how the call ended."""
+        return bool(self.future.done())
+
+    def result(self) -> Any:
+        """Waits for the result of the call, or for its error.
+
+        Raises:
+            CancelledError: The scheduler is gone.
+        """
+        while not self.future.done() and self.client.status != "closed":
+            wait([self.future], BETWEEN_LOOKS)
+        if not self.future.done():
+            raise CancelledError("the scheduler is gone")
+        return self.future.result()
 
 
 def _address(named: str) -> str:

@@ -17,7 +17,7 @@ from typing import Any, Generic, Protocol, TypeVar, cast
 from tqdm import tqdm
 
 import derain
-from derain.errors import InputError
+from derain.errors import InputError, reason_of
 from derain.jobs.job import Job
 from derain.jobs.unit import Record, Unit
 from derain.system.notices import warn
@@ -364,11 +364,11 @@ def _await_results(task: Task[UnitT, ResultT], unit: UnitT, future: Any) -> Sequ
         return task.fail(unit, InputError(unit.id, reason, "See the log of the worker."))
 
 
-def _ended(unit: Unit, error: BaseException) -> InputError:
+def _ended(unit: Unit, error: Exception) -> InputError:
     """The error of an executor that does no further unit."""
     return InputError(
         "executor",
-        f"it ended before {unit.id} was done ({error or type(error).__name__})",
+        f"it ended before {unit.id} was done ({reason_of(error)})",
         "Run the same command again: it does the remaining units.",
     )
 

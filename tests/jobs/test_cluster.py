@@ -1,12 +1,14 @@
 """A Dask cluster as an executor, and schedulers that are not there."""
 
+from concurrent.futures import CancelledError, Future
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from jobs.counting import Counting
 
 from derain.errors import InputError
-from derain.jobs.cluster import dask_executor
+from derain.jobs.cluster import Work, dask_executor
 from derain.jobs.job import Job
 from derain.jobs.running import Task, run
 from derain.jobs.unit import Unit
@@ -28,6 +30,13 @@ def test_a_cluster_does_the_units_of_a_job_and_repeats_one_whose_worker_dies(tmp
     assert contents == ["0 done", "1 done", "2 done", None, "4 done"]
     assert found[3].error.reason == "is broken"
     assert len((tmp_path / "1.tries").read_text().splitlines()) == 2
+
+
+def test_a_call_whose_scheduler_is_gone_ends_though_its_future_never_does() -> None:
+    work = Work(Future(), SimpleNamespace(status="closed"))
+    assert not work.done()
+    with pytest.raises(CancelledError):
+        work.result()
 
 
 def test_a_scheduler_that_is_not_there_is_one_line(tmp_path) -> None:
