@@ -47,7 +47,7 @@ from derain.example import or_example
 from derain.files.documents import Entry
 from derain.files.format import FORMATS
 from derain.sources.folders import named_frames
-from derain.stores.url import place_of
+from derain.stores.url import paths_of, place_of
 from derain.system.extras import MATPLOTLIB, require
 from derain.system.notices import warn
 from derain.views.candidates import candidates_at
@@ -134,7 +134,8 @@ def _describe(name: str, arguments: argparse.Namespace) -> None:
     if name == DEFAULT:  # not ./default, which is a file or folder; a Path would make both the same
         _describe_default(arguments.json)
         return
-    path = in_bag(or_example(Path(name)), arguments.topic)
+    [path] = paths_of([name])
+    path = in_bag(or_example(path), arguments.topic)
     if os.path.isdir(path) and not is_bag(path):
         _describe_folder(path, arguments)
         return

@@ -47,6 +47,7 @@ from derain.sources.bag_frame import NUMBER, BagFrame
 from derain.sources.folders import frame_of, named_frames
 from derain.sources.frame import Frame
 from derain.sources.recordings import irregularities
+from derain.stores.url import paths_of
 from derain.system.extras import MATPLOTLIB, OPEN3D, require
 from derain.system.notices import Notices, warn
 
@@ -102,7 +103,7 @@ def main(arguments: argparse.Namespace) -> int:
             reason = "cannot be combined with --out or --window"
             raise InputError("--rerun", reason, "Leave them out.")
         return _view_recording(arguments)
-    path = arguments.scans[0]
+    path = paths_of(arguments.scans)[0]
     if or_example(path) != path:
         path = example_file()
     if len(arguments.scans) > 1 or (path.is_dir() and not is_bag(path)):

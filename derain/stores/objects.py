@@ -37,9 +37,9 @@ VERSIONS = (
     "created",
 )
 
-# Errors that the next try would meet again; and those of botocore that refuse access, by their
-# names, for it may not be installed.
-FINAL = (IsADirectoryError, NotImplementedError)
+# Errors that the next try would meet again, and those that refuse access. Those of botocore are
+# known by their names, for it may not be installed.
+FINAL = ("IsADirectoryError", "NotImplementedError", "ParamValidationError")
 REFUSALS = ("NoCredentialsError", "PartialCredentialsError", "ProfileNotFound")
 
 # The status of an answer of a web server after which another request may succeed.
@@ -185,6 +185,8 @@ def opened(url: str) -> tuple[Any, str]:
             f"names no store that is known ({without_secrets(reason_of(error))})",
             "Give a URL such as s3://bucket/folder.",
         ) from None
+    except OSError as error:  # some connect at once
+        raise _failed(url, error) from None
     return filesystem, path
 
 
@@ -237,10 +239,10 @@ def _refusal(url: str, error: Exception) -> InputError | None:
     if isinstance(error, PermissionError) or type(error).__name__ in REFUSALS:
         return InputError(
             without_secrets(url),
-            f"the store refuses access ({_reason(error)})",
+            f"the store refuses access ({_reason(url, error)})",
             "Check the credentials that its library finds in the environment.",
         )
-    return _failed(url, error) if isinstance(error, FINAL) else None
+    return _failed(url, error) if type(error).__name__ in FINAL else None
 
 
 def _is_missing(error: FileNotFoundError) -> bool:
@@ -256,12 +258,12 @@ def _missing(url: str) -> InputError:
 def _failed(url: str, error: Exception, tries: str = "") -> InputError:
     return InputError(
         without_secrets(url),
-        f"a request failed{tries} ({_reason(error)})",
+        f"a request failed{tries} ({_reason(url, error)})",
         "Check the store, then run the same command again.",
     )
 
 
-def _reason(error: Exception) -> str:
+def _reason(url: str, error: Exception) -> str:
     if isinstance(error, FileNotFoundError) and isinstance(error.__cause__, Exception):
         error = error.__cause__
-    return without_secrets(f"{type(error).__name__}: {reason_of(error)}")
+    return without_secrets(f"{type(error).__name__}: {reason_of(error)}", url)

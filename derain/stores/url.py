@@ -36,16 +36,25 @@ def paths_of(places: Iterable[Place]) -> list[Path]:
     """
     paths = []
     for place in places:
-        if is_url(place):
+        path = Path(place)
+        url = url_of(path)  # also of a path that was made of one
+        if is_url(url) and not path.exists():
             raise InputError(
-                without_secrets(str(place)), "is not on this machine", "Copy it to a folder first."
+                without_secrets(url), "is not on this machine", "Copy it to a folder first."
             )
-        paths.append(Path(place))
+        paths.append(path)
     return paths
 
 
-def without_secrets(text: str) -> str:
-    """A text in which no URL has a user, a password or a query: signatures are in queries."""
+def without_secrets(text: str, url: str = "") -> str:
+    """A text in which no URL has a user, a password or a query: signatures are in queries.
+
+    Args:
+        text: The text.
+        url: One whose user and password the text may have without the rest of it.
+    """
+    for user in re.findall(f"{SCHEME}://([^/\\s@]*@)", url):
+        text = text.replace(user, "…@")
     without_users = re.sub(rf"({SCHEME}://)[^/\s@]*@", r"\1", text)
     return re.sub(rf"({SCHEME}://[^\s?]*)\?\S*", r"\1", without_users)
 

@@ -26,6 +26,8 @@ def test_what_works_in_folders_alone_refuses_urls() -> None:
     assert paths_of(["drives", Path("more")]) == [Path("drives"), Path("more")]
     with pytest.raises(InputError, match=r"s3://bucket/drives: is not on this machine"):
         paths_of(["drives", "s3://me:secret@bucket/drives"])
+    with pytest.raises(InputError, match=r"s3://bucket/drives: is not on this machine"):
+        paths_of([Path("s3://bucket/drives")])
 
 
 @pytest.mark.parametrize("path", ["drives/a.bin", "/drives/s3:/a", "a:b/c"])
@@ -42,3 +44,5 @@ def test_keys_that_lead_elsewhere_are_refused(key) -> None:
 def test_no_secret_is_left_in_a_text() -> None:
     text = "see s3://me:secret@bucket/a@b.bin and https://host/a?sig=secret, not me@host"
     assert without_secrets(text) == "see s3://bucket/a@b.bin and https://host/a not me@host"
+    quoted = without_secrets("no bucket me:secret@bucket", "s3://me:secret@bucket/a")
+    assert quoted == "no bucket …@bucket"
