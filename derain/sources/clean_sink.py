@@ -155,7 +155,7 @@ class CleanSink:
                 yield frame, broken[frame.clouds]
 
     def _is_among_scans(self, folder: Path) -> bool:
-        """True if a folder without scans of its own lies in the one that the scans were found in."""
+        """True if a folder without scans of its own lies where scans were searched for."""
         place = folder.absolute()
         scans = [frame for frame in self._source if isinstance(frame, FileFrame)]
         if any(scan.path.absolute().is_relative_to(place) for scan in scans):
