@@ -21,6 +21,11 @@ ROUNDS = 3
 # sensors are within a tenth of it.
 FARTHEST_STRAY = 1.0
 
+# Where the inclinations of the beams are not found, a column of the grid is taken to have as many
+# beams as this quantile of the columns has returns: even rows as fine as the closest of uneven
+# beams are several times as many.
+FULLEST_COLUMNS = 0.99
+
 
 @dataclass(frozen=True, eq=False)
 class RecordedBeams(Columns):
@@ -51,8 +56,10 @@ def find_beams(scan: Scan, generator: Generator) -> RecordedBeams:
     - To any other scan a grid is fitted, see :func:`derain.views.grid_fit.fit_grid`. Its empty
       pixels are beams that returned nothing, with an exception: a return that shares its pixel with
       another has left a pixel of its own empty. The same number of empty pixels, chosen at random,
-      are therefore no beams. A sensor that looks one way, with returns in no rows, may have a round
-      field of view: only its pixels in the convex hull of the returns are beams.
+      are therefore no beams. Where the inclinations of the beams are not found, a column has no
+      more beams than the fullest columns have returns. A sensor that looks one way, with returns in
+      no rows, may have a round field of view: only its pixels in the convex hull of the returns are
+      beams.
 
     Args:
         scan: The scan. Rows that are not valid, or of a radar, are empty cells or no beams.
@@ -118,7 +125,12 @@ def _unreturned(scan: Scan, valid: Bools, generator: Generator) -> RecordedBeams
     doubled = len(seen) - (pixels - len(empty))
     if not fit.beams and fit.grid.azimuth != ALL_AROUND:
         empty = empty[_looked_at(fit, scan.xyz[seen[pixel >= 0]], empty)]
-    count = np.clip(len(empty) - doubled, 0, len(empty))
+    count = len(empty) - doubled
+    if not fit.beams:
+        returns = np.bincount(pixel[pixel >= 0] % fit.grid.columns, minlength=fit.grid.columns)
+        most = np.quantile(returns, FULLEST_COLUMNS) * fit.grid.columns
+        count = min(count, int(most) - len(seen))
+    count = max(count, 0)
     chosen = np.sort(generator.choice(empty, count, replace=False))
     by_pixel = np.argsort(pixel, kind="stable")
     before = np.searchsorted(pixel[by_pixel], chosen) - 1
