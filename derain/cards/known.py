@@ -8,9 +8,6 @@ from derain.cards.card import AUTO_DETECTIONS, AutoDetect, DataCard, load_card, 
 from derain.cards.layout import Layout
 from derain.files.labels import label_beside
 
-# The usual folder of labels; where it is the layout's, they may lie beside the scans instead.
-USUAL_LABELS = Layout().labels
-
 
 def cards_naming(ids: Collection[int]) -> list[str]:
     """Names of the packaged data cards that have all of some ids among their classes."""
@@ -45,17 +42,17 @@ def layouts_for(card: DataCard | None) -> tuple[Layout, ...]:
 
 
 def label_of(scan: Path, layouts: Iterable[Layout] | None = None) -> Path:
-    """Path of a scan's labels: in the folder that its layout has for them, or beside it.
+    """Path of a scan's labels: beside it, or in the folder that its layout has for them.
 
     Args:
         scan: The scan.
         layouts: Those that it may have, the likeliest first; by default those of the packaged data
             cards.
     """
-    place = scan.absolute()
+    folder = scan.absolute().parent.name
     known = known_layouts() if layouts is None else layouts
-    layout = next((layout for layout in known if layout.scans == place.parent.name), Layout())
-    return label_beside(scan) if layout.labels == USUAL_LABELS else layout.label_of(place)
+    layout = next((layout for layout in known if layout.scans == folder), Layout())
+    return label_beside(scan, layout.labels)
 
 
 def label_places(scan: Path) -> Iterator[Path]:

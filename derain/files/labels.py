@@ -18,13 +18,13 @@ from derain.scan import LARGEST_ID, Array, Ints
 LABEL = ".label"
 
 
-def label_beside(scan: Path) -> Path:
-    """Path of a scan's labels: beside it if they are there, else in the sibling `labels`."""
+def label_beside(scan: Path, folder: str = "labels") -> Path:
+    """Path of a scan's labels: beside it if they are there, else in the sibling folder."""
     label = beside(scan, LABEL)
     # The folder above the scan's, also where the scan is named from within its own.
     sequence = scan.absolute().parent.parent
     # Not Path.is_file, which raises where the name has become too long by its suffix.
-    return label if os.path.isfile(label) else sequence / "labels" / label.name
+    return label if os.path.isfile(label) else sequence / folder / label.name
 
 
 def read_labels(path: Path, points: int) -> NDArray[np.uint32]:

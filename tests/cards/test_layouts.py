@@ -51,9 +51,11 @@ def test_labels_are_looked_for_beside_the_folders_of_scans(tmp_path, scan, label
     assert tmp_path / label in label_places(tmp_path / scan)
 
 
-def test_labels_beside_a_scan_go_before_those_in_a_folder(tmp_path) -> None:
-    (tmp_path / "3.label").touch()
-    assert label_of(tmp_path / "3.bin") == tmp_path / "3.label"
+@pytest.mark.parametrize("folder", ["lidar_radar_pcd", "velodyne", "anything"])
+def test_labels_beside_a_scan_go_before_those_in_a_folder(tmp_path, folder) -> None:
+    (tmp_path / folder).mkdir()
+    (tmp_path / folder / "3.label").touch()
+    assert label_of(tmp_path / folder / "3.bin") == tmp_path / folder / "3.label"
 
 
 def test_labels_and_sequence_are_found_from_within_the_folder_of_scans(
