@@ -46,6 +46,7 @@ from derain.recordings.posed import with_poses
 from derain.sources.bag_frame import NUMBER, BagFrame
 from derain.sources.folders import frame_of, named_frames
 from derain.sources.frame import Frame
+from derain.sources.reader import FrameReader
 from derain.sources.recordings import irregularities
 from derain.stores.url import paths_of
 from derain.system.extras import MATPLOTLIB, OPEN3D, require
@@ -165,7 +166,7 @@ def _view_scan(path: Path, arguments: argparse.Namespace) -> None:
     card = None if arguments.card is None else load_card(arguments.card)
     frame = frame_of(path, arguments.columns, layouts_for(card))
     scan = frame.with_intensity_times(arguments.intensity_scale).read()
-    labelled = None if card is None else scan.with_label(frame.read_label(len(scan)))
+    labelled = None if card is None else FrameReader(card).with_labels(scan, frame)
     trivial = {"all": np.ones(len(scan), bool), "none": np.zeros(len(scan), bool)}
     notices, predicted = Notices(), {}
     for title, name in names.items():

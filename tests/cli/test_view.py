@@ -68,6 +68,12 @@ def test_a_card_without_labels_is_refused(refused, tmp_path) -> None:
     assert not (tmp_path / "out.png").exists()
 
 
+def test_labels_that_are_no_classes_of_the_card_are_refused(refused, scan, tmp_path) -> None:
+    options = ["--methods", "all", "--card", "kitti", "--out", tmp_path / "out.png"]
+    assert "ids [110] are no classes of SnowyKITTI" in refused("view", scan, *options)
+    assert not (tmp_path / "out.png").exists()
+
+
 def test_points_that_nobody_knows_are_not_judged(succeed, scan, tmp_path, saved_figures) -> None:
     write_labels(tmp_path / "labels/7.label", np.repeat([255, 0, 3], [100, 170, 30]))
     options = ["--methods", "all", "--card", "rehearse3d", "--out", tmp_path / "out.png"]
