@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatter
 
 from derain.evaluation.contents import Contents, class_name, rate_name
 from derain.pictures.scan_pictures import legend_below, titled_figure
@@ -66,5 +67,8 @@ def _draw_points(
         axes.bar(left, heights, width, color=colours[rate], label=rate_name(rate))
     axes.set_xticks(range(len(ids)), [class_name(id_, classes) for id_ in ids], rotation=30)
     axes.set_yscale("log")
+    # The usual ones of this axis write mathematics, which pictures are saved without.
+    axes.yaxis.set_major_formatter("{x:,.0f}")
+    axes.yaxis.set_minor_formatter(LogFormatter())
     axes.set_ylabel("points")
     axes.set_title("labelled points by class" if ids else "no labels")

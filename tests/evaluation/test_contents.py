@@ -83,6 +83,9 @@ def test_the_picture_has_a_bar_for_each_class_and_rate_and_a_slice_for_each_rate
     angles = [wedge.theta2 - wedge.theta1 for wedge in shares.patches]
     assert np.abs(angles) == pytest.approx(np.arange(1, 5) * 36)
     assert points.get_yscale() == "log"
+    counts = "".join(tick.get_text() for tick in points.get_yticklabels(which="both"))
+    assert counts
+    assert "$" not in counts
     assert [bar.get_height() for bar in points.patches] == [5, 4, 6, 4, 7, 4, 8, 4]
     assert [tick.get_text() for tick in points.get_xticklabels()] == ["background", "rain"]
     assert points.patches[0].get_facecolor() == to_rgba(CLEAN)
