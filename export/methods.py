@@ -55,7 +55,8 @@ def read_parameters(path: str | Path) -> tuple[str, dict[str, Any]]:
         not there, its name stays as it is.
 
     Raises:
-        InputError: A missing file, one that names no method, or candidates that are none.
+        InputError: A missing file, one that names no method, parameters that a filter or
+            persistence does not take, or candidates that are none.
     """
     path = Path(path)
     document = Entry.of_yaml(path)
@@ -67,10 +68,17 @@ def read_parameters(path: str | Path) -> tuple[str, dict[str, Any]]:
     method = values.pop("method").text()
     beside = path.parent / method
     named = str(beside) if Path(method).suffix and is_file(beside) else method
-    return named, {
+    parameters = {
         name: candidates_at(entry) if name == CANDIDATES else entry.scalar()
         for name, entry in values.items()
     }
+    # Made here once, so that errors name the file; a model takes longer, and has only a threshold.
+    if method != DEFAULT and not Path(method).suffix:
+        try:
+            load_method(method, parameters)
+        except InputError as error:
+            raise InputError(f"{path}: {error.subject}", error.reason, error.remedy) from error
+    return named, parameters
 
 
 def split_title(text: str) -> tuple[str, str]:
