@@ -51,7 +51,7 @@ from derain.export.bench.bench_entries import bench_entries
 from derain.export.bench.cost import Effort
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.export.bench.report import with_published_rows
-from derain.files.atomic import require_writable, write_text
+from derain.files.atomic import require_writable_folder, write_text
 from derain.sources.frame import Frame
 from derain.sources.source import Frames
 from derain.sources.spread import evenly_spaced
@@ -109,7 +109,7 @@ def main(arguments: argparse.Namespace) -> int:
         else None,
         runtime_of(arguments),
     )
-    require_writable(arguments.out / "bench.json")
+    require_writable_folder(arguments.out)
     effort = Effort(arguments.threads, arguments.timed, arguments.repeats, arguments.seed)
 
     division, workers = unit_options.division_of(arguments), arguments.workers or 1

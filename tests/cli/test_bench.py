@@ -216,4 +216,11 @@ def test_a_folder_that_cannot_be_written_is_refused_before_any_work(
     monkeypatch.delattr(bench, "score")
     out = root / "manifest.json"
     line = refused("bench", "--data", root, "--methods", "all", "--out", out)
-    assert "bench.json: cannot be written" in line
+    assert "manifest.json: cannot be written" in line
+
+
+def test_a_bench_that_is_refused_leaves_no_folder(refused, root, tmp_path) -> None:
+    refused(
+        "bench", "--data", root, "--methods", "all", "--columns", "x,y", "--out", tmp_path / "out"
+    )
+    assert not (tmp_path / "out").exists()
