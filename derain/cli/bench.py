@@ -132,7 +132,12 @@ def main(arguments: argparse.Namespace) -> int:
         return found
 
     if arguments.paper is None:
-        found = bench(_frames(data, arguments.part), arguments.out)
+        frames = _frames(data, arguments.part)
+        if arguments.rain_rates and not any(frame.sequence in rates for frame in frames):
+            reason = "names no sequence of these scans"
+            remedy = f'Name them by their folders, as "{frames[0].sequence}": 25.'
+            raise InputError(arguments.rain_rates, reason, remedy)
+        found = bench(frames, arguments.out)
         if found is not None:
             print_lines(str(found))
         return 0

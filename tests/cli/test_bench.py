@@ -198,6 +198,18 @@ def test_table_3_takes_the_rain_rates_of_a_file(succeed, root, tmp_path) -> None
     assert {path.name for path in out.iterdir()} == {"heavy", "medium", "table3.md"}
 
 
+def test_rain_rates_of_other_sequences_are_refused(refused, succeed, root, tmp_path) -> None:
+    rates = tmp_path / "rates.yaml"
+    rates.write_text('"099": 25')
+    command = ["bench", "--data", root, "--rain-rates", rates, "--methods", "all", *ONCE]
+    line = refused(*command, "--out", tmp_path / "out")
+    assert (
+        'rates.yaml: names no sequence of these scans. Name them by their folders, as "002"' in line
+    )
+    rates.write_text('"099": 25\n"002": 25')  # those of a whole data set may be more
+    succeed(*command, "--out", tmp_path / "out")
+
+
 def test_the_papers_tables_need_a_data_set_with_a_split(refused, root, tmp_path) -> None:
     scans = root / "sequences/002/lidar_radar_pcd"
     data = ["--paper", "table2", "--data", scans, "--card", "rehearse3d"]
