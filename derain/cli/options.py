@@ -21,6 +21,9 @@ from derain.sources.frame import Frame
 if TYPE_CHECKING:
     from derain.datamodules.labelled import LabelledScans
 
+# Suffixes of the formats of pictures that commands write.
+PICTURES = (".png", ".jpg", ".pdf", ".svg", ".eps")
+
 
 def count(text: str, least: int = 1, most: float = math.inf) -> int:
     """A whole number of 1 or more."""

@@ -152,10 +152,8 @@ def save(figure: Figure, path: Path) -> None:
     """Writes a figure in the format that the suffix names, such as PNG.
 
     Raises:
-        InputError: An output that cannot be written, or a suffix of no known picture format.
+        InputError: An output that cannot be written.
     """
-    if path.suffix[1:].lower() not in figure.canvas.get_supported_filetypes():
-        raise InputError(path, f"'{path.suffix}' is no format of pictures", "Name it .png.")
     for text in figure.findobj(Text):
         # Names of files may hold control sequences, or $, which begins mathematics.
         text.set_text("\n".join(map(printable, text.get_text().split("\n"))))

@@ -43,17 +43,19 @@ def test_the_help_of_run_fits_a_screen_and_help_all_has_every_option(succeed) ->
 @pytest.mark.parametrize(
     ("arguments", "suffix"),
     [
-        (["export", "model.ckpt"], ".onnx"),
-        (["learn", "recording"], ".onnx"),
-        (["import-weights", "outdet", "model.pt", "--stats", "wads"], ".ckpt"),
-        (["tune", "dsor", "--data", "scans"], ".yaml"),
+        (["export", "model.ckpt", "--out"], ".onnx"),
+        (["learn", "recording", "--out"], ".onnx"),
+        (["import-weights", "outdet", "model.pt", "--stats", "wads", "--out"], ".ckpt"),
+        (["tune", "dsor", "--data", "scans", "--out"], ".yaml"),
+        (["view", "scan.bin", "--out"], ".png"),
+        (["info", "scans", "--picture"], ".png"),
     ],
 )
-def test_a_model_is_written_only_under_a_suffix_that_it_is_known_by(
+def test_a_file_is_written_only_under_a_suffix_that_it_is_known_by(
     refused, tmp_path, arguments, suffix
 ) -> None:
-    line = refused(*arguments, "--out", tmp_path / "model.txt")
-    assert f"--out: {tmp_path / 'model.txt'} does not end in {suffix}" in line
+    line = refused(*arguments, tmp_path / "model.txt")
+    assert f"{arguments[-1]}: {tmp_path / 'model.txt'} does not end in {suffix}" in line
 
 
 def test_a_reader_that_has_had_enough_ends_the_command_quietly() -> None:
