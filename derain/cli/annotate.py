@@ -24,8 +24,8 @@ is required: begin with the road alone, then add boxes around objects that the p
 rain.
 
 Each radar frame, in the LiDAR's frame, belongs to the scan of the same name. Its points get the
-label of the nearest LiDAR point, in the folder radar. `derain fuse` pairs frames by time and
-transforms them into the LiDAR's frame.
+label of the nearest LiDAR point, in the folder radar. For other radar frames leave --radar out, and
+give the labels to `derain fuse --labels`, which pairs frames by time, transforms and labels them.
 """
 
 import argparse
@@ -126,6 +126,6 @@ def _radar_frames(folder: Path | None, columns: Sequence[str], source: Source) -
         return {}
     frames = {frame.key: frame for frame in named_frames([folder], columns, layouts=())}
     for key in frames.keys() - {frame.key for frame in source}:
-        reason = "no scan has its name"
-        raise InputError(frames[key].name, reason, "Pair the frames in time with `derain fuse`.")
+        remedy = "Leave --radar out, and give the labels to `derain fuse --labels`."
+        raise InputError(frames[key].name, "no scan has its name", remedy)
     return frames

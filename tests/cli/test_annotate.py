@@ -113,5 +113,6 @@ def test_a_radar_frame_of_other_columns_is_refused_with_the_option_that_names_th
 def test_a_radar_frame_of_no_scan_is_refused(refused) -> None:
     write_scan(Path("radar/000009.bin"), Scan.of(scene(20)))
     line = refused(*ANNOTATE, "out", "--radar", "radar")
-    assert "000009.bin: no scan has its name" in line
+    remedy = "Leave --radar out, and give the labels to `derain fuse --labels`."
+    assert f"000009.bin: no scan has its name. {remedy}" in line
     assert not Path("out").exists()
