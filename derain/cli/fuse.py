@@ -93,6 +93,10 @@ def main(arguments: argparse.Namespace) -> int:
     lidar = named_frames([arguments.lidar], arguments.lidar_columns, layouts=())
     radar = named_frames([arguments.radar], arguments.radar_columns, layouts=())
     folder_sink(scans, lidar)
+    extra = [name for name in arguments.extra.split(",") if name]
+    for former in scans.glob("*.bin" if extra else "*.npz"):
+        reason = "is of a run with another --extra, and would become a second scan of its name"
+        raise InputError(former, reason, "Delete these scans, or give another --out.")
     times = _times(lidar)
     nearest = nearest_in_time(times, _times(radar), arguments.within)
     if (nearest < 0).all():
@@ -100,7 +104,6 @@ def main(arguments: argparse.Namespace) -> int:
         remedy = "Check that the timestamps are seconds of one clock, or widen --within."
         raise InputError(arguments.radar, reason, remedy)
     partners = [radar[number] if number >= 0 else None for number in nearest.tolist()]
-    extra = [name for name in arguments.extra.split(",") if name]
     suffix = ".npz" if extra else ".bin"
     for frame, partner in tqdm(zip(lidar, partners, strict=True), total=len(lidar), disable=None):
         scan, label, detections = read_by(frame, "--lidar-columns"), None, NO_DETECTIONS

@@ -117,6 +117,14 @@ def test_what_cannot_be_fused_is_one_line_and_exit_code_2(refused, spoil, option
     assert not any(name.startswith(".") or name == "metadata.csv" for name in left)
 
 
+def test_scans_of_another_format_stay_alone_in_their_folder(refused, succeed) -> None:
+    succeed(*FUSE)
+    line = refused(*FUSE, "--radar-columns", COLUMNS, "--extra", "doppler")
+    assert "is of a run with another --extra" in line
+    succeed(*FUSE)
+    assert not list(Path("out").rglob("*.npz"))
+
+
 def test_the_input_is_never_overwritten(refused) -> None:
     Path("lidar").rename("lidar_radar_pcd")
     assert "would overwrite" in refused(*FUSE, "--lidar", "lidar_radar_pcd", "--out", ".")
