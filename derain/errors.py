@@ -30,7 +30,8 @@ class InputError(ValueError):
     """
 
     def __init__(self, subject: str | Path, reason: str, remedy: str) -> None:
-        reason = " ".join(reason.split())  # messages of other libraries may have several lines
+        # Messages of other libraries may have several lines, and a full stop.
+        reason = " ".join(reason.split()).removesuffix(".")
         reason, remedy = _cut(reason, LONGEST_REASON), _cut(remedy, LONGEST_REASON)
         super().__init__(printable(f"{_cut(str(subject), LONGEST_SUBJECT)}: {reason}. {remedy}"))
         self.subject = subject

@@ -8,7 +8,7 @@ from derain.errors import LONGEST_REASON, InputError, counted, reason_of
 
 def test_what_a_terminal_must_not_be_sent_is_escaped_and_other_scripts_stay() -> None:
     name = os.fsdecode(b"scan\x1b[2J\n\xff.bin")
-    error = InputError(name, "the reason\x07 of\nit\u202e größer", "Да.\r")
+    error = InputError(name, "the reason\x07 of\nit\u202e größer.", "Да.\r")
     assert str(error) == (r"scan\x1b[2J\n\udcff.bin: the reason\x07 of it\u202e größer. Да.\r")
     assert str(error).encode()
 
