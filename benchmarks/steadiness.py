@@ -81,6 +81,10 @@ def changed(scan: Scan) -> Iterator[tuple[str, Scan]]:
         rows = np.arange(2 * len(scan)) % len(scan)
         twice = replace(scan.take(rows), xyz=np.concatenate([xyz, copy.xyz]))
         yield f"doubled, ranges {1e3 * jitter:g} mm apart", twice
+    drawn = generator.integers(0, 256, len(scan)).astype(np.float32)
+    yield "intensities drawn at random", replace(scan, intensity=drawn)
+    rings = (np.arange(len(scan)) % 64).astype(np.float32)
+    yield "numbers of rows modulo 64 as intensities", replace(scan, intensity=rings)
 
 
 def doubled(scan: Scan) -> Iterator[tuple[str, Scan]]:

@@ -50,6 +50,12 @@ PSEUDO_POINTS = 100.0
 # Log-odds of brightness never exceed this, either way.
 LARGEST_LOG_ODDS = 6.0
 
+# How well intensity separates the rain of a scan from the rest where it means nothing, and where it
+# counts whole. By chance alone, intensities that are drawn anew separate snow by .006 at most, its
+# own by 1.8 or more.
+# Source: modelling choice.
+MEANINGLESS, MEANINGFUL = 0.01, 0.02
+
 # The least share of rain in a rainy scan; see ``without_intensity``.
 # Source: modelling choice.
 RAINY = 0.01
@@ -78,8 +84,8 @@ class CueNetwork(nn.Module):
         opinion: Features that a point passes to the points that it is a neighbour of.
         context: Features of what a scan holds at some range.
         fusion: Features of a point in the two hidden layers of a fusion.
-        without_intensity: Added to the log-odds of a rainy scan whose intensities are not known or
-            all the same: geometry alone is less sure of rain than both cues are. Less is added to
+        without_intensity: Added to the log-odds of a rainy scan whose intensities are not known, or
+            mean nothing: geometry alone is less sure of rain than both cues are. Less is added to
             scans of less rain, in proportion, so that a dry scan stays whole.
     """
 
@@ -145,13 +151,13 @@ class CueNetwork(nn.Module):
         others = _numbers(neighbours, points.shape[0])
         features, rain = self.geometry(seen, far, others, counts)
         doubtful = torch.nonzero(rain > DOUBTFUL)[:, 0]
-        cues = Cues(far, cell, distances, neighbours, others, counts, doubtful)
+        cues = Cues(far, cell, distances, neighbours, others, counts, doubtful, rain.detach())
         answers, features = [rain], taken_of_each(features, doubtful)
         for fusion in self.rounds:
             weighed = fusion(torch.cat([cues.around(answers[-1].detach()), features]))[0]
             answers.append(rain.scatter(0, doubtful, weighed))
         size = counts.double().sum()
-        if_unknown = self.without_intensity * (counts[:, 1:].sum() == 0).to(rain.dtype)
+        if_unknown = self.without_intensity * (1 - cues.meaning).to(rain.dtype)
         answers = [answer + if_unknown * _raininess(answer, size) for answer in answers]
         return [*answers, without_carrier(answers[-1], far, size)]
 
@@ -202,6 +208,11 @@ class Cues:
         others: The same as numbers of isolated points, S where they are crowded.
         counts: Points of the scan by shell and rank, float (SHELLS, INTENSITY_RANKS).
         doubtful: Isolated points that are weighed, int64 (D,).
+        rain: Log-odds of rain by geometry, float (S,).
+
+    Attributes:
+        meaning: How much intensity counts, from 0 to 1: at 0 it does not separate rain from the
+            rest, and the cues are those of a scan without intensities; float64 ().
     """
 
     def __init__(
@@ -213,10 +224,14 @@ class Cues:
         others: Tensor,
         counts: Tensor,
         doubtful: Tensor,
+        rain: Tensor,
     ) -> None:
         self._doubtful = doubtful
         self._cell_of_isolated = taken(cell, neighbours[0])
         self._calibration = Calibration(counts, self._cell_of_isolated)
+        separation = self._calibration(rain.clamp(-CERTAIN, CERTAIN).sigmoid()).separation
+        meaning = (separation[-1, 0] - MEANINGLESS) / (MEANINGFUL - MEANINGLESS)
+        self.meaning = meaning.clamp(0, 1)
         self._cell = taken(self._cell_of_isolated, doubtful)
         around = slice(1, APART[-1] + 1)
         self._others = taken_of_each(others[around], doubtful)
@@ -226,6 +241,7 @@ class Cues:
         range_ = (USUAL_RANGE * far.exp()).clamp_min(NEAREST_POINT)
         apart = taken_of_each(distances[APART, :], doubtful) / range_
         rank = (self._cell % INTENSITY_RANKS).to(far.dtype) / (INTENSITY_RANKS - 1)
+        rank = rank * self.meaning.to(far.dtype)
         self._places = torch.cat(
             [(far + 0.3)[None], torch.log(apart + NEAREST_APART) + 4, rank[None]]
         )
@@ -238,10 +254,10 @@ class Cues:
                 brightness.
         """
         rain = rain.clamp(-CERTAIN, CERTAIN)
-        calibrated = self._calibration(rain.sigmoid())
+        calibrated = self._calibration(rain.sigmoid(), self.meaning)
         first = calibrated.log_odds[:-1].flatten().to(rain.dtype)
         with_first = rain + SHARE_ADDED * taken(first, self._cell_of_isolated)
-        by_cell = self._calibration(with_first.sigmoid()).by_cell().to(rain.dtype)
+        by_cell = self._calibration(with_first.sigmoid(), self.meaning).by_cell().to(rain.dtype)
         brightness, of_scan, *of_shell, separation = taken_of_each(by_cell, self._cell).split(1)
         own = taken(rain, self._doubtful)[None]
         with_crowded = torch.cat([rain, rain.new_full((1,), OF_CROWDED)])
@@ -290,12 +306,17 @@ class Calibration:
         # In float64, for sums of float32 over a whole scan differ from one runtime to another.
         self._points = self._smoothed(counts.double())
 
-    def __call__(self, probability: Tensor) -> "Brightness":
-        """Histograms by the points' probabilities of rain, float (S,)."""
+    def __call__(self, probability: Tensor, meaning: Tensor | float = 1.0) -> "Brightness":
+        """Histograms by the points' probabilities of rain.
+
+        Args:
+            probability: Float (S,).
+            meaning: How much intensity counts, from 0 to 1, float64 ().
+        """
         rain = self._points.new_zeros(SHELLS * INTENSITY_RANKS)
         rain = rain.scatter_add(0, self._cell, probability.double())
         rain = self._smoothed(rain.reshape(SHELLS, INTENSITY_RANKS))
-        return Brightness(rain, (self._points - rain).clamp_min(0))
+        return Brightness(rain, (self._points - rain).clamp_min(0), meaning)
 
     def _smoothed(self, counts: Tensor) -> Tensor:
         """Half of each count spread to those beside it; the sum of all shells in the last row."""
@@ -321,16 +342,23 @@ class Brightness:
         rain: Points of rain by shell and rank of intensity, and in the last row those of all
             shells, float64 (SHELLS + 1, INTENSITY_RANKS).
         rest: All other points, as ``rain``.
+        meaning: How much intensity counts, from 0 to 1, float64 ().
     """
 
     rain: Tensor
     rest: Tensor
+    meaning: Tensor | float
 
     @cached_property
     def log_odds(self) -> Tensor:
         """Log-odds of rain, 0 where intensity means nothing, as ``rain``."""
         odds = self._share(self.rain).log() - self._share(self.rest).log()
-        return odds.clamp(-LARGEST_LOG_ODDS, LARGEST_LOG_ODDS)
+        return self.meaning * odds.clamp(-LARGEST_LOG_ODDS, LARGEST_LOG_ODDS)
+
+    @cached_property
+    def separation(self) -> Tensor:
+        """Relative entropy of rain's intensities to those of the rest, float64 (SHELLS + 1, 1)."""
+        return (self._share(self.rain) * self.log_odds).sum(1, keepdim=True)
 
     def by_cell(self) -> Tensor:
         """What is known of each shell and rank together, float64 (6, SHELLS * INTENSITY_RANKS).
@@ -340,15 +368,14 @@ class Brightness:
         separates its rain from the rest; its share of rain; and how well intensity separates rain
         from the rest in the whole scan.
         """
-        separation = (self._share(self.rain) * self.log_odds).sum(1, keepdim=True)
         rain, rest = (each[:-1].sum(1, keepdim=True) for each in (self.rain, self.rest))
         numbers = torch.broadcast_tensors(
             self.log_odds[:-1] / 2,
             self.log_odds[-1:] / 2,
             rain.log1p() / 4,
-            separation[:-1],
+            self.separation[:-1],
             rain / (rain + rest + 1),
-            separation[-1:],
+            self.separation[-1:],
         )
         return torch.stack(numbers).flatten(1)
 

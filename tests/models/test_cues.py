@@ -123,6 +123,15 @@ def test_points_without_intensity_are_judged_as_in_a_scan_that_has_none(packaged
     assert judgement.share_of_rain == judgement.rain.mean()
 
 
+def test_intensities_that_mean_nothing_are_judged_as_none(packaged) -> None:
+    scan = labelled(26, drops=2000)
+    drawn = np.random.default_rng(0).integers(0, 256, len(scan)).astype(np.float32)
+    found = packaged.probability(replace(scan, intensity=drawn))
+    blank = packaged.probability(replace(scan, intensity=None))
+    np.testing.assert_allclose(found, blank, atol=1e-3)
+    assert (blank > 0.5).mean() > 0.1
+
+
 def test_rows_in_another_order_are_judged_alike(packaged) -> None:
     scan = labelled(21)
     order = np.random.default_rng(0).permutation(len(scan))
