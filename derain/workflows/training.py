@@ -260,7 +260,9 @@ class WholeConfig(SaveConfigCallback):
     """
 
     def setup(self, trainer: Trainer, pl_module: LightningModule, stage: str) -> None:
-        """Writes it where the run's log goes, once."""
+        """Writes it where the run's log goes, once; without a log it is not written."""
+        if not trainer.loggers:  # the folder is the current one, whose files are the user's
+            return
         folder = trainer.log_dir  # every process reads it: the first sends it to the others
         if folder is None or "://" in folder:
             super().setup(trainer, pl_module, stage)
@@ -321,7 +323,7 @@ def run_trainer(
             seed_everything_default=0,
             auto_configure_optimizers=False,
             save_config_callback=WholeConfig,
-            # Every run has a folder of its own; only one without a logger meets its last one.
+            # A run whose version is stated meets the last one of it.
             save_config_kwargs={"overwrite": True},
             trainer_defaults={"enable_model_summary": False, **(trainer or {})},
             parser_kwargs={**of_parsers, method: {**of_parsers, "description": description}},

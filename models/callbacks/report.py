@@ -28,7 +28,7 @@ class TestReport(lightning.Callback):
         text = as_text(model.metrics, model.card.name)
         checkpoint = None if trainer.ckpt_path is None else str(trainer.ckpt_path)
         scores = {"data": model.card.name, "checkpoint": checkpoint, **as_dict(model.metrics)}
-        folder = trainer.log_dir
+        folder = trainer.log_dir if trainer.loggers else None  # not the current folder
         if not trainer.is_global_zero:
             return
         print(text)

@@ -39,3 +39,15 @@ def test_a_training_that_lightning_refuses_leaves_no_folder(last_line, wads) -> 
     line = last_line("fit", *wads, *SHORT, "--trainer.val_check_interval", "100")
     assert "val_check_interval" in line
     assert not list(Path("runs/outdet_wads").iterdir())
+
+
+@pytest.mark.parametrize("command", ["validate", "test", "predict"])
+def test_without_a_logger_a_configuration_of_the_same_name_stays(
+    succeed, wads, checkpoint, command
+) -> None:
+    Path("config.yaml").write_text("seed_everything: 1  # mine")
+    before = {*Path().iterdir(), Path("labels")}
+    logger = ("--trainer.logger", "false", "--predictions.folder", "labels")
+    succeed(command, *wads, *logger, "--ckpt_path", checkpoint)
+    assert Path("config.yaml").read_text() == "seed_everything: 1  # mine"
+    assert set(Path().iterdir()) <= before

@@ -31,7 +31,7 @@ def test_the_folder_is_printed_with_escapes(tmp_path, capsys) -> None:
     rain = np.arange(100) < 50
     metrics.update(Scan.of(scene(100)).with_label(np.where(rain, 110, 0)), rain)
     trainer = SimpleNamespace(
-        log_dir=str(folder), is_global_zero=True, loggers=[], ckpt_path="runs/last.ckpt"
+        log_dir=str(folder), is_global_zero=True, loggers=[None], ckpt_path="runs/last.ckpt"
     )
     TestReport().on_test_end(trainer, SimpleNamespace(metrics=metrics, card=card))
     last = capsys.readouterr().out.splitlines()[-1]
