@@ -68,7 +68,7 @@ def fit(
         trainer = run_trainer(["fit", *options], trainer=defaults).trainer
     return FitResults(
         checkpoint_of_run(trainer),
-        None if trainer.log_dir is None else Path(trainer.log_dir),
+        Path(trainer.log_dir) if trainer.loggers and trainer.log_dir else None,
         {name: float(value) for name, value in trainer.callback_metrics.items()},
     )
 

@@ -227,7 +227,11 @@ class DerainCLI(LightningCLI):
 
     def instantiate_trainer(self, **kwargs: Any) -> Trainer:
         """Makes the trainer, which writes its checkpoints whole or not at all."""
-        return save_whole(super().instantiate_trainer(**processes_of_torchrun(), **kwargs))
+        trainer = save_whole(super().instantiate_trainer(**processes_of_torchrun(), **kwargs))
+        if not trainer.loggers:  # the monitor refuses to train without one
+            callbacks = trainer.callbacks  # type: ignore[attr-defined]
+            callbacks[:] = [each for each in callbacks if not isinstance(each, LearningRateMonitor)]
+        return trainer
 
     def instantiate_classes(self) -> None:
         """Instantiates data, model and trainer; what they find wrong is not the parser's error."""

@@ -60,5 +60,13 @@ def test_without_a_validation_the_checkpoint_is_the_last_if_there_is_any(
     assert (checkpoint and checkpoint.name) == name
 
 
+def test_without_a_logger_a_training_has_no_folder(settings, here) -> None:
+    del settings["trainer.logger.save_dir"]
+    results = fit("outdet_wads.yaml", {**settings, "trainer.logger": False}, quiet=True)
+    assert results.folder is None
+    assert load_model(results.checkpoint).spec.network == "outdet"
+    assert {path.name for path in here.iterdir()} == {"WADS", "checkpoints"}
+
+
 def test_without_rain_to_validate_on_there_is_no_iou() -> None:
     assert FitResults(Path("best.ckpt"), None, {"val_iou": np.nan}).iou is None
