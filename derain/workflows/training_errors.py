@@ -87,8 +87,11 @@ def _unknown(key: str, known: Collection[str]) -> InputError:
     likely = [renamed, OF_OTHER_PROGRAMS.get(key, "")]
     likely += sorted(option for option in known if option.endswith(f".{key}"))
     likely += difflib.get_close_matches(key, known, n=1)
-    near = [option for option in likely if option in known]
-    return InputError(key, "no such option", f"Did you mean {near[0]}?" if near else HINT)
+    near = [option for option in likely if option in known and option != key]
+    reason = "no such option"
+    if key in known:  # of another network or data module
+        reason = f"the chosen {key.split('.')[0]} has no such option"
+    return InputError(key, reason, f"Did you mean {near[0]}?" if near else HINT)
 
 
 def _unusable(subject: str, message: str) -> InputError:

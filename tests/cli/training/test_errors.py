@@ -22,6 +22,8 @@ FIT = ("fit", "--config", "outdet_simulated.yaml")
         ("--data.campain.scans", "1", "no such option. Did you mean data.campaign.scans?"),
         ("--ckpt", "x", "no such option. Did you mean ckpt_path?"),
         ("--colour_of_the_sky", "x", "no such option. All options: --help-all."),
+        ("--model.width", "8", "the chosen model has no such option. All options: --help-all."),
+        ("--data.train", "[]", "the chosen data has no such option. All options: --help-all."),
         ("--data.campaign.scans", "[3]", "data.campaign.scans: cannot be [3]. Give: int."),
         ("--model.neighbours", "0", "--model.neighbours: "),
         ("--data.loading.batch_size", "0", "batch_size"),
