@@ -96,6 +96,8 @@ def train(arguments: list[str]) -> int:
         trainer = run_trainer(words, EXAMPLES[arguments[0]], callbacks).trainer
     except InputError as error:
         renamed = error.renaming_option("--columns", "--data.loading.columns")
+        written = "columns x,y,z,intensity,ring", "columns '[x,y,z,intensity,ring]'"
+        renamed = renamed.renaming_option(*written)
         raise renamed.renaming_option("--card", "--data.card") from error
     checkpoint = checkpoint_of_run(trainer)
     if arguments[0] == "fit" and checkpoint is not None and trainer.is_global_zero:

@@ -35,6 +35,9 @@ OF_OTHER_PROGRAMS = {
     "lr": "model.learning_rate",
 }
 
+# Kinds of values whose names do not show how they are written.
+LISTS = dict.fromkeys(("list", "tuple"), "a list, such as [a,b]")
+
 HINT = "All options: --help-all."
 
 # Lines that only lead to the fault below them.
@@ -98,7 +101,7 @@ def _unusable(subject: str, message: str) -> InputError:
     lines = [line.strip().removeprefix("- ") for line in message.splitlines()]
     faults = [line for line in lines if line and not line.startswith(_HEADINGS)]
     kinds = [found["kind"] for line in faults if (found := _EXPECTED.match(line))]
-    kinds = [kind for kind in dict.fromkeys(kinds) if kind != "NoneType"]
+    kinds = [LISTS.get(kind, kind) for kind in dict.fromkeys(kinds) if kind != "NoneType"]
     others = list(dict.fromkeys(line for line in faults if not _EXPECTED.match(line)))
     value = _VALUE.search(message)
     if others or not (kinds and value):

@@ -1,5 +1,6 @@
 """A wrong option, key or value of Lightning's command line is one line that names the right one."""
 
+import shlex
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,7 @@ FIT = ("fit", "--config", "outdet_simulated.yaml")
         ("--model.width", "8", "the chosen model has no such option. All options: --help-all."),
         ("--data.train", "[]", "the chosen data has no such option. All options: --help-all."),
         ("--data.campaign.scans", "[3]", "data.campaign.scans: cannot be [3]. Give: int."),
+        ("--data.loading.columns", "x,y,z", "cannot be x,y,z. Give: a list, such as [a,b]."),
         ("--model.neighbours", "0", "--model.neighbours: "),
         ("--data.loading.batch_size", "0", "batch_size"),
         ("--seed_everything", "-1", "--seed_everything: "),
@@ -86,6 +88,17 @@ def test_the_remedy_for_labels_names_an_option_of_training(last_line, labels, op
     line = last_line("fit", "--model", "OutDet", *data, *parts)
     assert option in line
     assert f" --{option.rpartition('.')[2]}" not in line
+
+
+def test_the_remedy_for_columns_is_an_option_that_is_taken(last_line) -> None:
+    Path("scan.bin").write_bytes(bytes(20))
+    Path("scan.label").write_bytes(bytes(4))
+    data = ("--data", "Folder", "--data.root", ".", "--data.card", "wads")
+    parts = ("--data.train", "['scan.bin']", "--data.validation", "['scan.bin']")
+    line = last_line("fit", "--model", "OutDet", *data, *parts)
+    remedy = shlex.split(line.rpartition("e.g. ")[2].removesuffix("."))
+    assert remedy == ["--data.loading.columns", "[x,y,z,intensity,ring]"]
+    assert "columns" not in last_line("fit", "--model", "OutDet", *data, *parts, *remedy)
 
 
 @pytest.mark.parametrize(
