@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from derain.errors import InputError
 from derain.workflows.progress import EpochLines
 from derain.workflows.training import checkpoint_of_run, quiet_lightning, run_trainer
 
@@ -79,6 +80,9 @@ def fit_options(config: str | Path | None, settings: Mapping[str, Any]) -> list[
     Args:
         config: As for :func:`fit`.
         settings: As for :func:`fit`.
+
+    Raises:
+        InputError: A setting of another type than options can have.
     """
     words = [] if config is None else ["--config", str(config)]
     for name, value in settings.items():
@@ -88,7 +92,10 @@ def fit_options(config: str | Path | None, settings: Mapping[str, Any]) -> list[
 
 
 def _listed(value: Any) -> Any:
-    """A number or an array of NumPy as JSON takes it."""
+    """A path in a list, or a number or an array of NumPy, as JSON takes it."""
+    if isinstance(value, Path):
+        return str(value)
     if isinstance(value, np.generic | np.ndarray):
         return value.tolist()
-    raise TypeError(f"a setting cannot be of type {type(value).__name__}")
+    reason = f"one cannot be of type {type(value).__name__}"
+    raise InputError("settings", reason, "Give texts, numbers, paths or lists of these.")

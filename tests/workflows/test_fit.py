@@ -21,10 +21,17 @@ def test_settings_are_options_of_the_command() -> None:
     )
 
 
-def test_settings_may_be_numbers_and_arrays_of_numpy() -> None:
-    settings = {"trainer.max_epochs": np.int64(2), "model.milestones": np.array([1, 2])}
-    words = fit_options(None, settings)
-    assert words == ["--trainer.max_epochs", "2", "--model.milestones", "[1, 2]"]
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(np.int64(2), "2"), (np.array([1, 2]), "[1, 2]"), ([Path("a.bin")], '["a.bin"]')],
+)
+def test_settings_may_be_of_numpy_and_lists_of_paths(value, text) -> None:
+    assert fit_options(None, {"data.train": value}) == ["--data.train", text]
+
+
+def test_a_setting_that_no_option_can_have_is_refused_by_its_type() -> None:
+    with pytest.raises(InputError, match="settings: one cannot be of type set"):
+        fit_options(None, {"data.train": {"a.bin"}})
 
 
 @pytest.fixture
