@@ -154,7 +154,7 @@ class DerainCLI(LightningCLI):
             super().parse_arguments(parser, args)
         except argparse.ArgumentError as error:
             known = known_options(self._subcommand_parsers[self._method], classes)
-            raise as_input_error(error.message, known) from error
+            raise as_input_error(error.message, known, classes) from error
         self._check_options()
         path = self.config[self.config.subcommand].get("ckpt_path")
         if path in (None, *FOUND_BY_LIGHTNING):

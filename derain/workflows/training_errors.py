@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from jsonargparse import ArgumentParser
 from lightning.fabric.utilities.exceptions import MisconfigurationException
 
-from derain.errors import InputError
+from derain.errors import InputError, did_you_mean
 from derain.models.former_names import FORMER_OPTIONS
 
 # Steps of a key in a file that an option on the command line leaves out.
@@ -24,6 +24,7 @@ _UNKNOWN = (
 )
 _SECTION = re.compile(r'Parser key "([^"]+)"')
 _ARGUMENT = re.compile(r"argument (?:--)?(?P<option>\S+): (?P<fault>.*)")
+_NO_CLASS = re.compile(r"Expected a dot import path string: (?P<name>.*)")
 _EXPECTED = re.compile(r"Expected an? <class '(?P<kind>[^']+)'>")
 _VALUE = re.compile(r"(?:Got|Given) value: (?P<value>.*)$", re.MULTILINE)
 
@@ -64,7 +65,9 @@ def known_options(parser: ArgumentParser, classes: Mapping[str, Iterable[type]])
     }
 
 
-def as_input_error(message: str, known: Collection[str]) -> InputError:
+def as_input_error(
+    message: str, known: Collection[str], classes: Mapping[str, Iterable[type]]
+) -> InputError:
     """One line for what the parser prints in a page.
 
     An option is named without its dashes: it may stand in a configuration.
@@ -72,6 +75,7 @@ def as_input_error(message: str, known: Collection[str]) -> InputError:
     Args:
         message: The parser's.
         known: All options, without their dashes.
+        classes: What can be chosen by its name alone, by the option that chooses it.
     """
     section = ".".join(_SECTION.findall(message))
     for pattern in _UNKNOWN:
@@ -81,6 +85,11 @@ def as_input_error(message: str, known: Collection[str]) -> InputError:
             return _unknown(key, known)
     if found := _ARGUMENT.match(message):
         return InputError(found["option"], found["fault"], HINT)
+    if section in classes and (found := _NO_CLASS.search(message)):
+        names = [each.__name__ for each in classes[section]]
+        remedy = f"Available: {', '.join(names)}; others by module and name."
+        remedy = did_you_mean(found["name"], names) + remedy
+        return InputError(section, f"there is no class {found['name']}", remedy)
     return _unusable(section or "command line", message)
 
 
