@@ -72,6 +72,7 @@ def _nested(depth: int) -> list[Any]:
 
 GROUP = ("optimizer_states", 0, "param_groups", 0)
 STATE = ("optimizer_states", 0, "state", 0)
+EPOCHS = ("loops", "fit_loop", "epoch_progress", "current")
 PROGRESS = ("loops", "fit_loop", "epoch_loop.batch_progress")
 
 # Checkpoints that name what they are not, by what is wrong with them.
@@ -115,6 +116,7 @@ HOSTILE: dict[str, Change] = {
     "loops in a list": _setting("loops", [1]),
     "no loop of a training": _dropping("loops", "fit_loop"),
     "progress that is a text": _setting(*PROGRESS, "far"),
+    "progress to the last epoch": _setting(*EPOCHS, "processed", 2),
     "negative progress": _setting(*PROGRESS, "total", "ready", -5),
     "no optimisers": _setting("optimizer_states", []),
     "optimisers in a mapping": _setting("optimizer_states", {"adam": 1}),

@@ -14,6 +14,7 @@ from lightning.pytorch.callbacks import ModelCheckpoint
 from torch import Tensor
 from torch.optim import Optimizer
 
+from derain.errors import InputError, counted
 from derain.files.documents import Entry
 from derain.models.callbacks.best_checkpoint import BestCheckpoint
 
@@ -59,8 +60,9 @@ class Resumption(lightning.Callback):
         """Compares what Lightning restores next with what the run has.
 
         Raises:
-            InputError: Loops, optimisers, schedulers or a scaler of another training, or a learning
-                rate that is planned for another number of steps.
+            InputError: Loops, optimisers, schedulers or a scaler of another training, one that has
+                reached its last epoch, or a learning rate that is planned for another number of
+                steps.
         """
         checkpoint, self._checkpoint = self._checkpoint, None
         if checkpoint is None:
@@ -76,6 +78,13 @@ class Resumption(lightning.Callback):
         whole = {name: Entry(str(trainer.ckpt_path), name, checkpoint.get(name)) for name in own}
         for name in own.keys() & checkpoint.keys():
             checkpoint[name] = matching_state(whole[name], own[name])
+        epochs = checkpoint["loops"]["fit_loop"]["epoch_progress"]["current"]["processed"]
+        if 0 <= (trainer.max_epochs or -1) <= epochs:
+            raise InputError(
+                str(trainer.ckpt_path),
+                f"has {counted(epochs, 'epoch')} already, of {trainer.max_epochs}",
+                "Raise --trainer.max_epochs, or use the checkpoint as it is.",
+            )
         for found, schedule in zip(checkpoint["lr_schedulers"], own["lr_schedulers"], strict=True):
             planned, steps = found.get("total_steps"), schedule.get("total_steps")
             if planned != steps:
