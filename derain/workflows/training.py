@@ -6,7 +6,7 @@ import os
 import shutil
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -290,6 +290,8 @@ class WholeConfig(SaveConfigCallback):
             # The arguments come last, and there is nothing of an earlier run.
             if names in (["config", "events"], ["config", "events", "hparams"]):
                 shutil.rmtree(folder)
+                with suppress(OSError):  # other runs of the name are in it
+                    folder.parent.rmdir()
 
 
 def run_trainer(

@@ -32,13 +32,13 @@ def test_a_log_folder_that_cannot_be_written_is_one_line(last_line, wads, folder
 def test_a_training_that_its_data_refuse_leaves_no_folder(last_line) -> None:
     Path("absent").mkdir()
     assert "absent" in last_line("fit", "--config", "outdet_wads.yaml", "--data.root", "absent")
-    assert not list(Path("runs/outdet_wads").iterdir())
+    assert not list(Path("runs").iterdir())
 
 
 def test_a_training_that_lightning_refuses_leaves_no_folder(last_line, wads) -> None:
     line = last_line("fit", *wads, *SHORT, "--trainer.val_check_interval", "100")
     assert "val_check_interval" in line
-    assert not list(Path("runs/outdet_wads").iterdir())
+    assert not list(Path("runs").iterdir())
 
 
 @pytest.mark.parametrize("command", ["validate", "test", "predict"])
