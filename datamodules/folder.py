@@ -56,7 +56,9 @@ class Folder(ScanDataModule):
 
     def _matches(self, pattern: str) -> list[Path]:
         found = sorted(glob(pattern, root_dir=self.root, recursive=True))
-        matches = [self.root / path for path in found if not path.endswith(".label")]
+        paths = [self.root / path for path in found if not path.endswith(".label")]
+        matches = [path for path in paths if not path.is_dir()]
         if not matches:
-            raise InputError(self.root / pattern, "matches no scan", "Check root and pattern.")
+            remedy = "Check root and pattern, such as velodyne/*.bin."
+            raise InputError(self.root / pattern, "matches no scan", remedy)
         return matches

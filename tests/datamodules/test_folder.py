@@ -16,6 +16,7 @@ def names(frames: Source) -> list[str]:
 def test_patterns_find_scans_of_all_formats_each_in_order(tmp_path, write) -> None:
     for name in ("b.bin", "a.pcd", "c.npz"):
         write(tmp_path / name, (tmp_path / name).with_suffix(".label"))
+    (tmp_path / "folder").mkdir()  # is no scan
     data = Folder(str(tmp_path), "wads", train=["*"], validation=["b.*", "a.*"], test=["[ac].*"])
     assert names(data.frames("train")) == ["a.pcd", "b.bin", "c.npz"]
     assert names(data.frames("validation")) == ["b.bin", "a.pcd"]
@@ -36,9 +37,10 @@ def test_a_part_without_patterns_is_refused(tmp_path) -> None:
         Folder(str(tmp_path), "wads", train=["*.bin"]).frames("validation")
 
 
-@pytest.mark.parametrize("pattern", ["*.pcd", "", "velodyne/*", "*.label"])
+@pytest.mark.parametrize("pattern", ["*.pcd", "", "velodyne/*", "velodyne", "*.label"])
 def test_a_pattern_that_finds_nothing_is_named(tmp_path, write, pattern) -> None:
     write(tmp_path / "a.bin", tmp_path / "a.label")
+    (tmp_path / "velodyne").mkdir()
     with pytest.raises(InputError, match="matches no scan") as refusal:
         Folder(str(tmp_path), "wads", train=["a.bin", pattern]).frames("train")
     assert str(tmp_path / pattern) in str(refusal.value)
