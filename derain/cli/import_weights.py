@@ -20,6 +20,7 @@ from derain.cli.options import file_named
 from derain.cli.outputs import print_lines
 from derain.errors import InputError, did_you_mean
 from derain.system.extras import CHECKPOINT_LIBRARIES, require
+from derain.views.spherical_grid import PUBLISHED_GRIDS
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,8 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--data", help="data card of the training data (default: that of --stats)")
     parser.add_argument(
-        "--grid",
-        help="grid of the range image, if the network uses one: semantickitti, rehearse3d or wads",
+        "--grid", choices=PUBLISHED_GRIDS, help="grid of the range image, if the network uses one"
     )
     parser.add_argument(
         "--out", type=file_named(".ckpt"), required=True, help="the checkpoint to write"
@@ -65,8 +65,8 @@ def main(arguments: argparse.Namespace) -> int:
     try:
         model = published[name].from_published(weights, data.normalised_as(stats), arguments.grid)
     except InputError as error:
-        if str(error.subject).startswith("--") or error.subject in ("grid", data.name):
-            raise  # of an option, the grid or the card: not of the file
+        if str(error.subject).startswith("--") or error.subject == data.name:
+            raise  # of an option or the card: not of the file
         raise InputError(arguments.weights, error.reason, error.remedy) from error
     model.adopt(replace(model.spec, training=record_of_sequences(data.split.get("train", ()))))
     save_model(model, arguments.out)

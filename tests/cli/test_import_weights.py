@@ -86,12 +86,7 @@ def test_a_checkpoint_as_salsanext_saves_it_comes_with_its_grid(succeed, random_
         ("outdet", "published.pt", ("wads", "--grid", "wads"), "--grid: outdet sees neighbours"),
         ("outdet", "other.pt", ("wads",), "other.pt: the state_dict is of another network (1"),
         ("salsanext", "published.pt", ("wads",), "the state_dict is of another network"),
-        (
-            "salsanext",
-            "salsanext.pt",
-            ("wads", "--grid", "no"),
-            "grid: there is no grid named 'no'",
-        ),
+        ("salsanext", "salsanext.pt", ("wads", "--grid", "semantickiti"), "Did you mean semant"),
     ],
 )
 def test_what_cannot_be_imported_is_one_line_and_exit_code_2(
