@@ -366,6 +366,8 @@ def class_ids(label: Array) -> Ints:
 
 
 def _copied_to_float32(values: Array) -> Float32s:
+    if np.iscomplexobj(values):
+        raise TypeError("it is of complex numbers")  # NumPy would drop the imaginary part
     with np.errstate(over="ignore", invalid="ignore"):
         if isinstance(values, np.ma.MaskedArray):
             values = np.ma.filled(values.astype(np.float32), np.nan)

@@ -141,6 +141,7 @@ def test_what_is_no_array_of_points_is_refused_with_what_to_give_instead() -> No
         (None, "shape"),
         ([[1, 2, 3], [4]], "array"),
         (np.array([["a", "b", "c"]]), "xyz"),
+        (np.ones((5, 4), complex), "xyz cannot be converted .it is of complex numbers"),
     ):
         with pytest.raises(InputError, match=hint):
             Scan.of(given_)
