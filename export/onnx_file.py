@@ -42,7 +42,7 @@ NEGLIGIBLE = 1e-20
 
 def export(
     model: DerainingModule,
-    path: Path,
+    path: Path | str,
     calibration: Sequence[Frame] = (),
     runtime: Runtime = Runtime(),
 ) -> Proof:
@@ -62,6 +62,7 @@ def export(
         InputError: A model without a Spec, an output that cannot be written, a runtime that cannot
             run it, or a proof that fails; no file is left then.
     """
+    path = Path(path)
     with evaluation_on_cpu(model), replacing(path) as temporary:
         proto = _traced(model, model.spec)
         flushed = flush_to_zero(proto)
