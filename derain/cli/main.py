@@ -71,7 +71,10 @@ def main(arguments: list[str] | None = None) -> int:
         number of the signal that ended it.
     """
     arguments = sys.argv[1:] if arguments is None else arguments
-    for stream in (sys.stdout, sys.stderr):
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:  # closed, as by `>&-`: print to nowhere
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # names may hold what is no text
     warnings.simplefilter("ignore", ScanWarning)  # commands print what is odd about scans

@@ -8,6 +8,7 @@ import pytest
 
 import derain
 from derain.cli.main import BROKEN_PIPE, COMMANDS, TRAINING, module_of
+from derain.evaluation.hard_cases import scene
 
 MAIN = "import sys; from derain.cli.main import main; sys.exit(main())"
 
@@ -69,3 +70,17 @@ def test_a_reader_that_has_had_enough_ends_the_command_quietly() -> None:
         process.stdout.close()  # before the command prints anything
         assert process.stderr.read() == b""
         assert process.wait() == BROKEN_PIPE
+
+
+@pytest.mark.parametrize("closing", [">&-", "2>&-", ">&- 2>&-"])
+def test_a_closed_output_is_no_error(tmp_path, closing) -> None:
+    scene(100).tofile(tmp_path / "scan.bin")
+    command = [sys.executable, "-c", MAIN, "run", "ssr", "scan.bin", "--out", "out"]
+    closed = subprocess.run(
+        ["sh", "-c", f'"$@" {closing}', "sh", *command],
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        check=False,
+    )
+    assert b"Traceback" not in closed.stderr
+    assert (closed.returncode, (tmp_path / "out/scan.label").is_file()) == (0, True)
