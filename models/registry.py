@@ -9,4 +9,6 @@ if TYPE_CHECKING:
 
 # A file of derain/models enters its network by a decorator, `@NETWORKS.add("outdet")`. A package
 # outside derain does the same, and names its module under the entry points `derain.networks`.
-NETWORKS: "Registry[type[DerainingModule]]" = Registry("derain.models", "derain.networks")
+NETWORKS: "Registry[type[DerainingModule]]" = Registry(
+    "derain.models", "derain.networks", "DerainingModule"
+)

@@ -76,7 +76,7 @@ class Format(ABC):
         return None
 
 
-FORMATS: Registry[type[Format]] = Registry("derain.files.formats", "derain.formats")
+FORMATS: Registry[type[Format]] = Registry("derain.files.formats", "derain.formats", "Format")
 
 
 def format_of(path: Path) -> Format:

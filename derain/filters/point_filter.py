@@ -19,7 +19,7 @@ from derain.views.neighbours import Neighbourhoods, NeighbourView
 from derain.views.scan_issues import ScanIssue
 
 # Filters by name: those of this folder, and those that other packages bring.
-FILTERS: Registry[type["PointFilter"]] = Registry("derain.filters")
+FILTERS: Registry[type["PointFilter"]] = Registry("derain.filters", base="PointFilter")
 
 # The most that a filter may look at. No published one looks at more than 51, and a search for
 # thousands would fill the memory.

@@ -34,11 +34,13 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
     Args:
         package: Package whose modules add members, such as ``derain.filters``.
         group: Name of the entry points of other packages; by default the package's.
+        base: Name of the base class of every member.
     """
 
-    def __init__(self, package: str, group: str | None = None) -> None:
+    def __init__(self, package: str, group: str | None = None, base: str = "object") -> None:
         self.package = package
         self.group = group or package
+        self.base = base
         self._members: dict[str, Kind] = {}
         self._has_own = False
         self._has_others = False
@@ -47,10 +49,20 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
         """Decorates a member, which gets these names.
 
         Raises:
-            InputError: A name that another member has.
+            InputError: A name that another member has, or a member that is no subclass of the base
+                class or lacks one of its methods.
         """
 
         def added(member: Member) -> Member:
+            missing = ", ".join(sorted(getattr(member, "__abstractmethods__", ())))
+            if self.base not in [kind.__name__ for kind in getattr(member, "__mro__", ())]:
+                missing = f"the base class {self.base}"
+            if missing:
+                raise InputError(
+                    f"{self.group}: {names[0]}",
+                    f"{_origin(member)} is without {missing}",
+                    f"Define the class as {self.base} describes.",
+                )
             for name in names:
                 former = _origin(self._members.get(name, member))
                 if former != _origin(member):
@@ -101,7 +113,7 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
         for entry in sorted(entry_points(group=self.group), key=lambda entry: entry.name):
             try:
                 entry.load()
-            except Exception as error:  # whatever the code of others raises
+            except (Exception, SystemExit) as error:  # whatever the code of others raises
                 from derain.system.notices import warn  # here, because it imports tqdm
 
                 package = entry.dist.name if entry.dist else "that brings it"

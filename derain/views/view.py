@@ -144,4 +144,4 @@ class View(ABC):
 
 
 # Every view, by the name that it has in a Spec.
-VIEWS: Registry[type[View]] = Registry("derain.views")
+VIEWS: Registry[type[View]] = Registry("derain.views", base="View")

@@ -12,7 +12,9 @@ from derain.scan import Array, Float32s
 from derain.system.registry import Registry
 
 # Those of this folder, and those that other packages bring.
-RUNTIMES: Registry[type["Session"]] = Registry("derain.export.runtimes", "derain.runtimes")
+RUNTIMES: Registry[type["Session"]] = Registry(
+    "derain.export.runtimes", "derain.runtimes", "Session"
+)
 
 DEFAULT_RUNTIME, FLOAT32_PRECISION = "onnxruntime", "float32"
 

@@ -2,12 +2,18 @@
 
 import importlib
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sized
 
 import pytest
 
 from derain.errors import InputError
+from derain.export.runtimes.session import RUNTIMES, Session
+from derain.files.format import FORMATS, Format
+from derain.filters import FILTERS, PointFilter
+from derain.models.base import DerainingModule
+from derain.models.registry import NETWORKS
 from derain.system.registry import Registry
+from derain.views.view import VIEWS, View
 
 Write = Callable[..., None]
 
@@ -87,6 +93,7 @@ def test_modules_are_imported_when_somebody_asks_and_other_packages_last(things,
         ("import nothing_of_this_name", "ModuleNotFoundError: No module named 'nothing_of_this_"),
         ("raise OSError('no\\nlicence')", r"OSError: no licence"),
         ("def broken(", "SyntaxError: "),
+        ("raise SystemExit('bye')", "SystemExit: bye"),
         (member("brick"), "is the name of two entries, things.second.Brick and foreign_bad.Brick"),
     ],
 )
@@ -122,6 +129,29 @@ def test_two_of_one_name_are_refused_and_both_are_named(things) -> None:
     with pytest.raises(InputError, match=both):
         things.add("cobble", "brick")(type("Other", (), {}))
     assert "cobble" not in things
+
+
+def test_a_class_without_a_method_of_its_base_is_refused_and_the_method_is_named(things) -> None:
+    sand = type("Sand", (Sized,), {})
+    with pytest.raises(InputError, match=r"things: sand: .*Sand is without __len__"):
+        things.add("sand")(sand)
+    assert "sand" not in things
+
+
+@pytest.mark.parametrize(
+    ("registry", "base"),
+    [
+        (FILTERS, PointFilter),
+        (FORMATS, Format),
+        (NETWORKS, DerainingModule),
+        (RUNTIMES, Session),
+        (VIEWS, View),
+    ],
+)
+def test_a_class_of_another_base_is_refused(registry, base) -> None:
+    with pytest.raises(InputError, match=f"Sand is without the base class {base.__name__}"):
+        registry.add("sand")(type("Sand", (), {}))
+    assert "sand" not in registry
 
 
 def test_one_member_may_have_several_names_and_answers_to_the_first(things) -> None:
