@@ -196,8 +196,17 @@ def rain_among(
 
     Returns:
         True for rain, bool (M,).
+
+    Raises:
+        InputError: The filter, which may be of another package, answers something else.
     """
-    rain = filter.judge(view)
+    rain = np.asarray(filter.judge(view))
+    if (rain.dtype, rain.shape) != (np.dtype(bool), (view.size,)):
+        raise InputError(
+            filter.name,
+            f"its answer for {view.size} points is {rain.dtype} {rain.shape}",
+            f"Repair the filter: judge returns bool ({view.size},).",
+        )
     return rain if candidates is None else rain & candidates.among(scan)[view.first]
 
 

@@ -1,5 +1,6 @@
 """What holds for every filter: hard scans, copies, stages, and parameters that make no sense."""
 
+import re
 from dataclasses import make_dataclass, replace
 
 import numpy as np
@@ -149,3 +150,21 @@ def test_parameters_that_make_no_sense_are_refused(name, parameters, message) ->
 def test_what_is_no_filter_or_no_number_of_threads_is_refused(arguments, message) -> None:
     with pytest.raises(InputError, match=message):
         FilterDerainer(*arguments)
+
+
+@pytest.mark.parametrize(
+    ("answer", "found"),
+    [
+        (lambda points: np.zeros(points), "float64 (500,)"),
+        (lambda points: np.zeros(points - 1, bool), "bool (499,)"),
+        (lambda points: np.zeros(2 * points, bool), "bool (1000,)"),
+        (lambda points: None, "object ()"),
+    ],
+)
+@pytest.mark.parametrize("candidates", [None, Candidates((Bound("range", most=15.0),))])
+def test_an_answer_that_is_no_bool_for_each_point_is_refused(answer, found, candidates) -> None:
+    judge = {"judge": lambda self, view: answer(view.size)}
+    wrong = make_dataclass("Wrong", [], bases=(SOR,), namespace=judge, frozen=True)
+    message = f"wrong: its answer for 500 points is {found}. Repair the filter: "
+    with pytest.raises(InputError, match=re.escape(message)):
+        FilterDerainer(wrong(), candidates=candidates)(scene()[:500])
