@@ -93,8 +93,15 @@ def unpickled(file: BinaryIO, name: Path | str) -> dict[str, Any]:
         name: Its path or address, for errors.
 
     Raises:
-        InputError: It holds anything else.
+        InputError: It holds anything else, or is an ONNX file.
     """
+    if Path(name).suffix == ".onnx":
+        raise InputError(
+            name,
+            "is an ONNX file, whose weights are folded for deployment",
+            "Give its checkpoint: student.ckpt in the folder of `derain learn`, or best.ckpt in "
+            "the checkpoints of the run.",
+        )
     try:
         _refuse_compressed(file)
         placeholders = [(Placeholder, state) for state in TRAINER_STATE]

@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from derain.default import DEFAULT, default_checkpoint
-from derain.errors import InputError
 from derain.sources.training_record import record_of_parts
 from derain.spec import Spec
 
@@ -58,18 +57,5 @@ def checkpoint_of(start: str) -> Path:
 
     Args:
         start: A checkpoint, or ``default``.
-
-    Raises:
-        InputError: An ONNX file, whose weights are folded for deployment: no training goes on from
-            them.
     """
-    if start == DEFAULT:
-        return default_checkpoint()
-    if Path(start).suffix == ".onnx":
-        raise InputError(
-            start,
-            "no training goes on from an ONNX file, whose weights are folded",
-            "Give its checkpoint: student.ckpt in the folder of `derain learn`, or best.ckpt in "
-            "the checkpoints of the run.",
-        )
-    return Path(start)
+    return default_checkpoint() if start == DEFAULT else Path(start)

@@ -23,10 +23,19 @@ def trained(path: Path) -> OutDet:
     return model
 
 
-def test_an_onnx_file_is_refused_by_the_name_of_its_checkpoint() -> None:
-    with pytest.raises(InputError, match=r"^outdet\.onnx: .*student\.ckpt .*best\.ckpt"):
-        checkpoint_of("outdet.onnx")
-    assert checkpoint_of("outdet.ckpt") == Path("outdet.ckpt")
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["export", "outdet.onnx", "--out", "model.onnx"],
+        ["fit", "--config", "outdet_wads.yaml", "--start", "outdet.onnx"],
+        ["fit", "--config", "outdet_wads.yaml", "--ckpt_path", "outdet.onnx"],
+    ],
+)
+def test_an_onnx_file_is_refused_by_the_name_of_its_checkpoint(refused, here, command) -> None:
+    (here / "outdet.onnx").write_bytes(b"graph")
+    line = refused(*command)
+    assert line.startswith("derain: outdet.onnx: is an ONNX file, ")
+    assert line.index("student.ckpt ") < line.index("best.ckpt ")
 
 
 def test_default_is_the_checkpoint_that_derain_comes_with(tmp_path, monkeypatch) -> None:
