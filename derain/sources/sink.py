@@ -41,16 +41,22 @@ class FolderSink:
 
         Raises:
             InputError: The results of a frame would overwrite a scan, labels, or the results of
-                another frame.
+                another frame; or a frame is a file of labels, or named twice.
         """
         _real_folder.cache_clear()
         written: dict[str, Frame] = {}
         for frame in source:
+            if frame.suffix == LABEL:
+                remedy = "Name the scans alone, such as scans/*.bin, or their folder."
+                raise InputError(frame.name, "is a file of labels, not a scan", remedy)
             if isinstance(frame, FileFrame):
                 self._refuse_own_files(frame)
             target = self.path(frame, LABEL)
             other = written.setdefault(_real(target), frame)
             if other is not frame:
+                files = [_real(one.path) for one in (frame, other) if isinstance(one, FileFrame)]
+                if len(set(files)) < len(files):
+                    raise InputError(frame.name, "is named twice", "Name each scan once.")
                 raise InputError(
                     frame.name,
                     f"another scan has the same name: its results and those of {other.name} would "

@@ -102,8 +102,15 @@ def test_two_scans_of_one_key_are_refused(tmp_path) -> None:
 def test_one_scan_twice_is_refused(tmp_path) -> None:
     write(tmp_path / "0.bin")
     twice = [frame_of(tmp_path / "0.bin"), frame_of(tmp_path / "0.bin")]
-    with pytest.raises(InputError, match="another scan has the same name"):
+    with pytest.raises(InputError, match=r"0\.bin: is named twice\. Name each scan once"):
         FolderSink(tmp_path / "out").refuse_clashes(twice)
+
+
+def test_labels_named_among_the_scans_are_refused(tmp_path) -> None:
+    write(tmp_path / "0.bin", tmp_path / "0.label")
+    source = named_frames([tmp_path / "0.bin", tmp_path / "0.label"])
+    with pytest.raises(InputError, match=r"0\.label: is a file of labels, not a scan"):
+        FolderSink(tmp_path / "out").refuse_clashes(source)
 
 
 def test_scans_labels_and_what_is_taken_away_are_named_by_the_key(tmp_path) -> None:
