@@ -1,6 +1,7 @@
 """Scans and labels in sequences, which a split assigns to train, validation and test."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from derain.cards.card import load_card
@@ -37,7 +38,8 @@ class Sequences(ScanDataModule):
     ) -> None:
         super().__init__(load_card(card), loading)
         self.root = Path(root)
-        self.split = split or self.card.split
+        # Of a card, which refuses other parts.
+        self.split = replace(self.card, split=split or self.card.split).split
 
     def source(self, part: Part) -> Source:
         """The scans of a part's sequences, in order; for prediction those of the test part.

@@ -1,6 +1,6 @@
 """Data cards: descriptions of data sets, for training on them and for using trained models."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args
@@ -8,7 +8,7 @@ from typing import Any, Literal, TypeVar, get_args
 import numpy as np
 
 from derain.cards.layout import Layout
-from derain.errors import InputError
+from derain.errors import InputError, did_you_mean
 from derain.files.documents import Entry, packaged, packaged_or_own, shown
 from derain.scan import LARGEST_ID, Bools, Scan
 from derain.views.channels import UNITS, USUAL_CHANNELS
@@ -19,6 +19,8 @@ Parsed = TypeVar("Parsed")
 # nothing, what their classes are called, or also which of the classes are rain.
 AutoDetect = Literal["nothing", "classes", "rain"]
 AUTO_DETECTIONS: tuple[AutoDetect, ...] = get_args(AutoDetect)
+
+SPLIT_PARTS = ("train", "validation", "test")
 
 # What mean and std of a file are of, in their order.
 CHANNELS_OF_STATISTICS = ("x", "y", "z", "intensity")
@@ -61,7 +63,8 @@ class DataCard:
             file has it.
 
     Raises:
-        InputError: Two classes of one name; rain that is no class, or unknown that is none or rain.
+        InputError: Two classes of one name; rain that is no class, or unknown that is none or rain;
+            a split with other parts.
     """
 
     name: str
@@ -74,7 +77,7 @@ class DataCard:
     rain_share: float | None = None
     simulated: bool = False
     deduplicate: bool = False
-    split: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    split: Mapping[str, Sequence[str]] = field(default_factory=dict)
     layout: Layout = field(default_factory=Layout)
     auto_detect: AutoDetect = "nothing"
     parts: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
@@ -88,6 +91,11 @@ class DataCard:
         if not (known - set(self.rain)).issuperset(self.unknown):
             reason = f"{shown(list(self.unknown))} are not all ids of classes that are not rain"
             raise InputError("unknown", reason, remedy)
+        for part in self.split:
+            if part not in SPLIT_PARTS:
+                available = f"Available: {', '.join(SPLIT_PARTS)}."
+                remedy = f"{did_you_mean(part, SPLIT_PARTS)}{available}"
+                raise InputError(f"split.{part}", "there is no such part", remedy)
 
     @property
     def title(self) -> str:

@@ -10,10 +10,11 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 
 from derain import __version__
+from derain.cards.card import SPLIT_PARTS
 from derain.errors import InputError
 from derain.scan import Floats
 from derain.simulation.layouts import LAYOUTS
-from derain.simulation.manifest import MAKER, RAIN_RATE, SPLIT_PARTS
+from derain.simulation.manifest import MAKER, RAIN_RATE
 from derain.simulation.radar import Radar
 from derain.simulation.rain_field import UniformRain
 from derain.simulation.sensor import Sensor, load_sensor

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from derain.cards.card import SPLIT_PARTS
 from derain.errors import InputError
 from derain.files.atomic import write_text
 from derain.files.documents import Entry
@@ -18,9 +19,6 @@ MANIFEST = "manifest.json"
 
 # The value of ``made_by``, which distinguishes a manifest of derain from any other JSON file.
 MAKER = "derain.simulation"
-
-# Parts of its split.
-SPLIT_PARTS = ("train", "validation", "test")
 
 # Keys of the sequences of each part, of the rain rate of each sequence, of the checksums by path.
 SPLIT, RAIN_RATE, FILES = "split", "rain_rate_mm_h", "files"

@@ -119,6 +119,7 @@ def test_every_channel_has_its_statistics_and_its_unit(card_file) -> None:
         *(("unknown", value) for value in ([5], [0, 3])),
         *(("mean", [1, 2, 3]), ("std", [1, 1, 1, 0]), ("extra", {"doppler": [1, 0]})),
         *(("rain_share", 1.5), ("split", {"train": [8]})),  # as YAML reads 010
+        ("split", {"trian": ["00"]}),
         *(("licence", ["free"] * 1000), ("simulated", "no"), ("auto_detect", "all")),
         ("resolution", 5),
     ],
@@ -136,6 +137,7 @@ def test_a_card_that_makes_no_sense_is_refused(card_file, key, value) -> None:
         ({0: "a", 1: "a"}, {"rain": (0,)}, "classes"),
         ({0: "a"}, {"rain": (5,)}, "rain"),
         ({0: "a"}, {"rain": (0,), "unknown": (0,)}, "unknown"),
+        ({0: "a"}, {"rain": (0,), "split": {"trian": ("00",)}}, r"split\.trian"),
     ],
 )
 def test_a_card_made_in_python_is_checked_too(classes, ids, named) -> None:

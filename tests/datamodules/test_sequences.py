@@ -75,6 +75,11 @@ def test_folders_can_have_other_names(tmp_path, write) -> None:
     assert (frame.path.name, frame.label_path) == ("a.pcd", label)
 
 
+def test_a_split_with_another_part_is_refused() -> None:
+    with pytest.raises(InputError, match=r"^split\.trian: .*Did you mean train\? Available: "):
+        Rehearse3D(root="somewhere", split={"trian": ["003"]})
+
+
 @pytest.mark.parametrize(
     ("split", "part", "message"),
     [
