@@ -52,7 +52,7 @@ def read_parameters(path: str | Path) -> tuple[str, dict[str, Any]]:
         The method, and its parameters as the file has them: texts, finite numbers, true or false;
         ``candidates``, if there are any, as such.
         A model is sought from the file's own folder first, wherever the command runs; where it is
-        not there, its name stays as it is.
+        not there, from the working folder.
 
     Raises:
         InputError: A missing file, one that names no method, parameters that a filter or
@@ -65,8 +65,12 @@ def read_parameters(path: str | Path) -> tuple[str, dict[str, Any]]:
         raise document.fault(
             "it names no method", "Write one, such as `method: dsor`, and its parameters by name."
         )
-    method = values.pop("method").text()
+    entry = values.pop("method")
+    method = entry.text()
     beside = path.parent / method
+    if Path(method).suffix and not is_file(beside) and not is_file(Path(method)):
+        reason = f"there is no model {beside.absolute()}"
+        raise entry.fault(reason, "Put the model beside this file, or name its whole path.")
     named = str(beside) if Path(method).suffix and is_file(beside) else method
     parameters = {
         name: candidates_at(entry) if name == CANDIDATES else entry.scalar()

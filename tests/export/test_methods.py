@@ -69,6 +69,7 @@ def test_a_method_that_cannot_be_made_is_refused(name, parameters, reason) -> No
         "method: dsor\nrange_multiplier: .inf",
         "method: dsor\nrange_multiplier: null",
         f"method: dsor\nneighbours: 0x{'f' * 5000}",
+        "method: w2.onnx\nthreshold: .9",
     ],
 )
 def test_a_file_that_holds_no_parameters_is_refused(tmp_path, content) -> None:
