@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from derain.cards.card import load_card
+from derain.errors import InputError
 from derain.files import read_scan
 from derain.files.labels import read_labels
 from derain.scan import Scan
@@ -27,7 +28,12 @@ def example_file(weather: str = "snow") -> Path:
 
     Args:
         weather: ``rain`` or ``snow``.
+
+    Raises:
+        InputError: Another weather.
     """
+    if weather not in ("rain", "snow"):
+        raise InputError("weather", f"there is no example of {weather}", "Give rain or snow.")
     return example_folder() / "sequences" / weather / "lidar_radar_pcd" / "000000.bin"
 
 
@@ -45,6 +51,9 @@ def example_scan(weather: Literal["rain", "snow"] = "snow") -> Scan:
 
     Returns:
         x, y, z in metres as seen from the sensor, intensities from 0 to 255, and labels.
+
+    Raises:
+        InputError: Another precipitation.
     """
     scan = read_scan(example_file(weather))
     labels = example_file(weather).parents[1] / "lidar_radar_labels" / "000000.label"

@@ -1,9 +1,11 @@
 """The example that comes with derain: cleaned, looked at and described by its name alone."""
 
 import numpy as np
+import pytest
 
 import derain
 from derain.cards.card import load_card
+from derain.errors import InputError
 from derain.example import EXAMPLE, example_file, example_folder
 from derain.files import read_scan
 from derain.sources.folders import named_frames
@@ -19,6 +21,8 @@ def test_it_is_small_and_holds_rain_and_snow() -> None:
         scan = derain.example_scan(weather)
         assert 0.03 < np.isin(scan.label, RAIN).mean() < 0.3
         np.testing.assert_array_equal(scan.xyz, read_scan(example_file(weather)).xyz)
+    with pytest.raises(InputError, match=r"there is no example of fog\. Give rain or snow\."):
+        derain.example_scan("fog")
 
 
 def test_run_cleans_it_and_prints_what_was_found_beside_the_truth(succeed, here) -> None:
