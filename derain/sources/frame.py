@@ -85,7 +85,8 @@ class Frame(ABC):
         if self.has_labels:
             return
         if self.label_path is None:
-            raise InputError(self.name, "it has no labels", "Leave the scan out.")
+            remedy = "Leave the scan out, or find its labels by named_frames(..., labelled=True)."
+            raise InputError(self.name, "it has no labels", remedy)
         folder = Path(self.name).absolute().parent
         layout = f"layout: {{scans: {folder.name}, labels: FOLDER}}"
         raise InputError(

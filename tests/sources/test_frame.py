@@ -52,6 +52,8 @@ def test_labels_that_are_not_to_be_read_do_not_count(labelled) -> None:
         assert bare.fingerprint() == frame.fingerprint()
     with pytest.raises(InputError, match="it has no labels"):
         labelled.without_labels().read_label(50)
+    with pytest.raises(InputError, match=r"it has no labels\. .*labelled=True"):
+        labelled.without_labels().require_labels()
 
 
 def test_labels_that_the_card_does_not_know_are_named(labelled) -> None:
