@@ -42,7 +42,8 @@ def main(arguments: argparse.Namespace) -> int:
     print(f"Simulated rain, from streets to a table. Everything goes to {out}/\n")
     config = DemoConfig(out, settings=settings, scan=arguments.scan, columns=arguments.columns)
     run_demo(config, print_lines)
-    pictures = "yours/before_after.png", "before_after.png", "bench/speed_error.png"
+    first = f"{config.given.name}/before_after.png"
+    pictures = first, "before_after.png", "bench/speed_error.png"
     print_lines(f"Pictures in {out}: {', '.join(pictures)}")
     print_lines(f"Training: tensorboard --logdir {out / 'runs'}")
     return 0

@@ -74,6 +74,11 @@ class DemoConfig:
     workers: int = field(default_factory=usable_cores)
 
     @property
+    def given(self) -> Path:
+        """Folder of what is cleaned first: your own scans are not written among the example's."""
+        return self.out / (EXAMPLE if self.scan is None else "yours")
+
+    @property
     def data(self) -> Path:
         """Folder of the simulated scans."""
         return self.out / "simulated"
@@ -103,7 +108,7 @@ def run_demo(config: DemoConfig, show: Show = show_nothing) -> Bench:
     """
     # Cleaning, simulation, tuning and comparison; cleaning once more by the first network.
     steps = Steps(show, 4 + 2 * len(config.networks) + bool(config.networks))
-    clean_given_scans(config.scan or Path(EXAMPLE), config.columns, config.out / "yours", steps)
+    clean_given_scans(config.scan or Path(EXAMPLE), config.columns, config.given, steps)
     steps.begin(f"Simulation: rain in {len(config.streets.names)} streets")
     with processes(config.workers) as executor:
         simulate_track(config.data, config.streets, executor)

@@ -52,7 +52,7 @@ def test_every_step_is_shown_and_leaves_its_files(small) -> None:
 
     out = small.out
     assert any("points are rain or snow" in line for line in lines)
-    for picture in ("yours/before_after.png", "before_after.png", "bench/speed_error.png"):
+    for picture in ("example/before_after.png", "before_after.png", "bench/speed_error.png"):
         assert imread(out / picture)[..., :3].std() > 0
     (scan,) = (out / "simulated/sequences/002/lidar_radar_pcd").glob("*.bin")
     rain = np.fromfile(out / "cleaned" / f"{scan.stem}.label", "<u4") == 1
@@ -75,6 +75,8 @@ def test_the_model_that_comes_with_derain_cleans_your_own_scans(tmp_path, capsys
     assert "cut.bin: 5 bytes are not whole rows" in capsys.readouterr().err
     assert imread(out / "before_after.png")[..., :3].std() > 0
     assert {path.name for path in out.glob("*.label")} == {"0.label", "1.label"}
+    # A demonstration of the example writes elsewhere, so that a later one does not mix them.
+    assert DemoConfig(out, scan=mine).given != DemoConfig(out).given
 
 
 def test_an_unreadable_scan_is_refused_before_the_first_step(tmp_path, run_derain) -> None:
