@@ -4,6 +4,7 @@ import argparse
 import math
 import re
 from collections.abc import Callable, Sequence
+from itertools import takewhile
 from typing import Any, NoReturn
 
 from derain.errors import InputError, did_you_mean
@@ -97,7 +98,7 @@ class Parser(argparse.ArgumentParser):
         self, args: Sequence[str] | None = None, namespace: Any = None
     ) -> tuple[Any, list[str]]:
         """Parses the options of a command; refuses unknown ones."""
-        if args is not None and self._subparsers is None:
+        if args is not None:
             self._refuse_unknown_options(args)
         return super().parse_known_args(args, namespace)
 
@@ -105,9 +106,12 @@ class Parser(argparse.ArgumentParser):
         """Refuses a misspelt option, before argparse reports the right one as missing."""
         options = self._option_string_actions
         before_names = words[: words.index("--")] if "--" in words else words
+        dashes = "--"  # a word with one may be a negative number
+        if self._subparsers is not None:  # the options behind a command's name are the command's
+            before_names, dashes = list(takewhile(lambda word: word[:1] == "-", words)), "-"
         for word in before_names:
             name = word.partition("=")[0]
-            if not name.startswith("--") or any(one.startswith(name) for one in options):
+            if not name.startswith(dashes) or any(one.startswith(name) for one in options):
                 continue
             remedy = f"{did_you_mean(name, options)}`{self.prog} --help` lists its options."
             if name in GPU_OPTIONS:

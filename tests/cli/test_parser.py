@@ -69,6 +69,8 @@ def beginner(here) -> None:
         ("bench", ("--data, --methods, --out", " all none --out bench`")),
         ("", ("COMMAND", "`derain run scans/ --out cleaned`")),
         ("ruun", ("there is no ruun", "Did you mean run?")),
+        ("--verison", ("--verison: ", "Did you mean --version?")),
+        ("-V", ("-V: ", "no such option", "`derain --help`")),
         ("run dror s --outt o", ("--outt: ", "Did you mean --out?")),
         ("run dror s --out o --gpu", ("--gpu: ", "on the CPU")),
         ("run dror s --out o --device=cuda", ("--device: ", "on the CPU")),
