@@ -157,11 +157,15 @@ class CleanSink:
     def _is_among_scans(self, folder: Path) -> bool:
         """True if a folder without scans of its own lies where scans were searched for."""
         place = folder.absolute()
-        scans = [frame for frame in self._source if isinstance(frame, FileFrame)]
-        if any(scan.path.absolute().is_relative_to(place) for scan in scans):
+        frames = [frame for frame in self._source if isinstance(frame, FileFrame)]
+        scans = [frame.path.absolute() for frame in frames]
+        if not scans or any(scan.is_relative_to(place) for scan in scans):
             return False
-        # A key is the path of its scan from the folder that was searched.
-        roots = {scan.path.absolute().parents[: scan.key.count("/") + 1][-1] for scan in scans}
+        roots = {Path(os.path.commonpath(scans))}
+        for frame, scan in zip(frames, scans, strict=True):
+            # The key of a scan in a recording is its path from the folder that was searched.
+            if depth := frame.key.count("/"):
+                roots.add(scan.parents[: depth + 1][-1])
         return any(place.is_relative_to(root) for root in roots)
 
     def _is_in_bag(self, frame: Frame) -> bool:
