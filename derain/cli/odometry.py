@@ -3,8 +3,8 @@
 A line per scan holds the transform of its points into the frame of the first scan, as twelve
 numbers (KITTI's format).
 
-  derain odometry drive --out poses.txt
   derain odometry drive --out drive/poses.txt               later commands read them there
+  derain odometry drive --out drive.txt                     for --poses drive.txt
   derain odometry WADS --out poses                          poses/11.txt, poses/12.txt, ...
 
 SEQUENCE is a folder of consecutive scans, or a data set, or a part of one. The residual is the
