@@ -4,13 +4,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from hashlib import sha256
 from typing import Any
-from weakref import WeakKeyDictionary, WeakSet
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from derain.errors import InputError
 from derain.export.runtime import Derainer
-from derain.recordings.placing import PlacedFrames, PlacedMethod
+from derain.recordings.placing import UNLIKE, PlacedFrames, PlacedMethod, is_alike
 from derain.recordings.rays import RayEvidence, Rays, mean_evidence, ray_evidence
 from derain.scan import Float32s, Floats, Ints, Scan
 from derain.sources.judgement import Judgement
@@ -34,12 +34,6 @@ HALF_SOLID = 1.0
 # A judgement of another scan by itself, and what takes the frame of the scan that is judged to that
 # of the other, float64 (4, 4), metres.
 PlacedJudgement = tuple[Judgement, Floats]
-
-UNLIKE = ScanIssue(
-    "unlike the scans around it",
-    "the scans around it do not match it at its pose: the pose is wrong, or the scan is there "
-    "twice; it is judged by itself",
-)
 
 # Number of points, solid by the model, that a pose is checked at: more rays of another scan have to
 # end at them than go through them, or else a pose is wrong.
@@ -90,8 +84,6 @@ class RecordedDerainer(PlacedMethod):
         """Warnings about a scan for the model, and about the scans around it."""
         yield from self.model.issues(judgement)
         yield from self._recent.damage(judgement.scan)
-        if judgement.scan in self._unlike:
-            yield UNLIKE
 
     def as_dict(self) -> dict[str, Any]:
         """The model's name, its threshold, and the number of scans that it sees around one."""
@@ -109,7 +101,6 @@ class RecordedDerainer(PlacedMethod):
         self._recent = PlacedFrames(self.window, self.model.threads)
         self._rays: WeakKeyDictionary[Scan, Rays] = WeakKeyDictionary()
         self._alone: dict[Scan, Judgement | None] = {}
-        self._unlike: WeakSet[Scan] = WeakSet()
 
     def _judged(self, scans: WindowOfScans, stopwatch: Stopwatch) -> Judgement:
         scan = scans.judged.scan
@@ -133,7 +124,7 @@ class RecordedDerainer(PlacedMethod):
             return alone.probability
         evidence = self._evidence(alone.scan, solid, doubtful, others)
         if evidence is None:
-            self._unlike.add(alone.scan)
+            self._recent.doubts[alone.scan].append(UNLIKE)
             return alone.probability
         probability = alone.probability.copy()
         certain = np.finfo(np.float64).eps
@@ -166,16 +157,12 @@ class RecordedDerainer(PlacedMethod):
         found = []
         rows = np.concatenate([solid, doubtful])
         for other, transform in others:
-            # A scan that is there twice shows its own drops as what persists.
-            if np.array_equal(other.scan.xyz, scan.xyz, equal_nan=True):
-                continue
             places = scan.xyz[rows] @ transform[:3, :3].T + transform[:3, 3]
             rays, step = self._rays_of(other.scan), self._rays_of(scan).step
             solid_ends = solidity(other.probability[rays.rows])
             seen = ray_evidence(places, rays, step, solid_ends)
-            of_solid, of_doubtful = seen[: len(solid)], seen[len(solid) :]
-            if of_solid.ending.sum() > of_solid.through.sum():
-                found.append(of_doubtful)
+            if is_alike(scan, other.scan, seen[: len(solid)]):
+                found.append(seen[len(solid) :])
         return mean_evidence(found) if found else None
 
     def _alone_of(self, scan: Scan, stopwatch: Stopwatch) -> Judgement | None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from derain.files.documents import Entry
 from derain.recordings.evidence import ScanPoints, combined_log_odds, vote
-from derain.recordings.placing import PlacedFrames, PlacedMethod
+from derain.recordings.placing import UNLIKE, PlacedFrames, PlacedMethod, is_alike
 from derain.recordings.rays import RayEvidence, mean_evidence
 from derain.scan import Bools, Floats, Scan
 from derain.sources.frame import Frame
@@ -56,11 +56,12 @@ class PersistenceDerainer(PlacedMethod):
 
     Poses are those of the frames. Where a frame has none, or the record of it is damaged, they are
     found as it goes, and where that fails, no evidence is taken across the gap. A scan without any
-    other is judged by itself: nothing of it is known for sure, and nothing of it is called rain.
-    Its stages are read, odometry where no pose is given, view, network (the evidence) and back.
+    other, or that no other matches at its pose, is judged by itself: nothing of it is known for
+    sure, and nothing of it is called rain. Its stages are read, odometry where no pose is given,
+    view, network (the evidence) and back.
 
     Example:
-        >>> scans = [derain.read_scan("scan.bin")] * 3  # a wall, and drops that stay where they are
+        >>> scans = [derain.read_scan("scan.bin")] * 3  # one scan again, which gives no evidence
         >>> method = PersistenceDerainer()
         >>> answers = [method.push(scan) for scan in scans] + list(method.flush())
         >>> [answer is None for answer in answers]  # each but the last waits for the scan after it
@@ -129,13 +130,17 @@ class PersistenceDerainer(PlacedMethod):
             return _by_row(scan, points, agreed, known, frame)
 
     def _evidence(self, scans: WindowOfScans) -> RayEvidence | None:
-        """The evidence of the rays of the other scans; None without any."""
-        points, found = self._points[scans.judged.scan], []
+        """The evidence of the rays of the other scans; None if no scan matches."""
+        scan, alike, found = scans.judged.scan, [], []
         for other in (*scans.before, *scans.after):
             transform = scans.judged.to(other)
             if transform is not None and len(self._points[other.scan]):
-                found.append(points.evidence_of(self._points[other.scan], transform))
-        return mean_evidence(found) if found else None
+                found.append(self._points[scan].evidence_of(self._points[other.scan], transform))
+                if is_alike(scan, other.scan, found[-1]):
+                    alike.append(found[-1])
+        if found and not alike:
+            self._recent.doubts[scan].append(UNLIKE)
+        return mean_evidence(alike) if alike else None
 
 
 def _by_row(

@@ -6,9 +6,12 @@ from pathlib import Path
 from typing import ClassVar
 from weakref import WeakKeyDictionary
 
+import numpy as np
+
 from derain.errors import InputError
 from derain.files.reading import reading
 from derain.recordings.odometry import FrameOdometry
+from derain.recordings.rays import RayEvidence
 from derain.scan import Array, Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
@@ -20,6 +23,12 @@ from derain.views.scan_issues import ScanIssue
 
 # Kind of the issue of a frame whose record of its pose is damaged.
 SOUGHT = "its pose is computed from the scans"
+
+UNLIKE = ScanIssue(
+    "unlike the scans around it",
+    "the scans around it do not match it at its pose: the pose is wrong, or the scan is there "
+    "twice; it is judged by itself",
+)
 
 
 class PlacedFrames(RecentFrames):
@@ -65,8 +74,9 @@ class PlacedFrames(RecentFrames):
         return self.push(placed)
 
     def damage(self, scan: Scan) -> Iterator[ScanIssue]:
-        """The error of a damaged record of a scan's pose."""
-        yield from (doubt for doubt in self.doubts.get(scan, ()) if doubt.kind == SOUGHT)
+        """Doubts about a scan's pose, but that odometry does not find it."""
+        kinds = SOUGHT, UNLIKE.kind
+        yield from (doubt for doubt in self.doubts.get(scan, ()) if doubt.kind in kinds)
 
     def _placed(self, frame: Frame, scan: Scan) -> PlacedScan:
         pose, doubts = None, []
@@ -152,6 +162,19 @@ class PlacedMethod(Method):
     @abstractmethod
     def _end_recording(self) -> None:
         """Makes its ``PlacedFrames`` anew, and forgets what it has kept of scans."""
+
+
+def is_alike(scan: Scan, other: Scan, evidence: RayEvidence) -> bool:
+    """True if another scan matches one at its pose, and is not the same one again.
+
+    Args:
+        scan: The scan.
+        other: The other scan.
+        evidence: That of the other's rays at points of the scan that are solid, most of them.
+    """
+    # A scan that is there twice shows its own drops as what persists.
+    is_same = np.array_equal(other.xyz, scan.xyz, equal_nan=True)
+    return not is_same and bool(evidence.ending.sum() > evidence.through.sum())
 
 
 def are_placed(recording: Sequence[Frame]) -> bool:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from contents import contents
-from recorded_scenes import write_scenes
+from recorded_scenes import write_drive, write_scenes
 from window_method import Between, Dimmer
 
 from derain.annotation.manifest import CARD, LABELS, Manifest
@@ -230,16 +230,18 @@ def test_shards_put_the_labels_in_place_when_the_last_is_done(
 
 
 def test_scans_that_fail_are_left_out_of_a_whole_run_and_done_later(
-    succeed, run_derain, drive, tmp_path
+    succeed, run_derain, tmp_path
 ) -> None:
+    drive = write_drive(tmp_path / "drive", 6, POINTS, seed=0)
+    poses = ("--poses", drive / "poses.txt")
     out, scan = tmp_path / "out", drive / "000003.bin"
     content = scan.read_bytes()
     scan.write_bytes(b"12345")
-    outcome = run_derain(*command(drive, out, "--block", 2))
+    outcome = run_derain(*command(drive, out, *poses, "--block", 2))
     assert outcome.code == 2
     assert "1 of 6 scans could not be judged" in outcome.err.splitlines()[-1]
     assert [each.number for each in Manifest.read(out).scans] == [0, 1, 2, 4, 5]
     scan.write_bytes(content)
-    succeed(*command(drive, out, "--block", 2))
-    succeed(*command(drive, tmp_path / "whole"))
+    succeed(*command(drive, out, *poses, "--block", 2))
+    succeed(*command(drive, tmp_path / "whole", *poses))
     assert contents(out) == contents(tmp_path / "whole")

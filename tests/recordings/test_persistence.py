@@ -2,6 +2,7 @@
 
 import pickle
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export.methods import load_method
 from derain.files import write_scan
+from derain.files.extrinsics import motion_of_pose
 from derain.recordings.persistence import Persistence, PersistenceDerainer
 from derain.scan import Bools, Floats, Scan
 from derain.sources.folders import named_frames
@@ -97,6 +99,18 @@ def test_no_evidence_is_taken_across_a_gap() -> None:
     (alone,), with_first, with_both = judged(near[1:]), judged(near)[1], judged([*near, far])[1]
     assert (with_both.probability == with_first.probability).all()
     assert not (with_both.probability == alone.probability).all()
+
+
+def test_no_evidence_is_taken_of_a_wrong_pose_or_of_the_same_scan_again() -> None:
+    first, second = drive(2)
+    far = replace(second, sensor_to_world=motion_of_pose(1e6, 0, 0, 0, 0, 0))
+    for follower in (far, replace(first, number=1)):
+        method = PersistenceDerainer(Persistence(after=0), threads=2)
+        method.push(first)
+        answer = method.push(follower)
+        assert not answer.known.any()
+        kinds = [issue.kind for issue in method.issues(answer)]
+        assert kinds == ["unlike the scans around it", "nothing is known for sure"]
 
 
 def test_a_registration_that_fails_is_warned_of() -> None:
