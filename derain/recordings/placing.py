@@ -2,9 +2,10 @@
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
-from weakref import WeakKeyDictionary
+from weakref import WeakKeyDictionary, WeakSet
 
 import numpy as np
 
@@ -23,6 +24,8 @@ from derain.views.scan_issues import ScanIssue
 
 # Kind of the issue of a frame whose record of its pose is damaged.
 SOUGHT = "its pose is computed from the scans"
+
+SUCH_SCANS = "; scans like it are judged without those before them, and only the first is named"
 
 UNLIKE = ScanIssue(
     "unlike the scans around it",
@@ -50,6 +53,7 @@ class PlacedFrames(RecentFrames):
         self._odometry = FrameOdometry(threads)
         self.doubts: WeakKeyDictionary[Scan, list[ScanIssue]] = WeakKeyDictionary()
         self._stretch = 0
+        self._first_lost: WeakSet[Scan] = WeakSet()  # at most one scan
         self._has_poses: bool | None = None  # whether the last frame had a pose; None before any
 
     def place(self, frame: Frame | Scan | Array, stopwatch: Stopwatch) -> WindowOfScans | None:
@@ -74,9 +78,15 @@ class PlacedFrames(RecentFrames):
         return self.push(placed)
 
     def damage(self, scan: Scan) -> Iterator[ScanIssue]:
-        """Doubts about a scan's pose, but that odometry does not find it."""
-        kinds = SOUGHT, UNLIKE.kind
-        yield from (doubt for doubt in self.doubts.get(scan, ()) if doubt.kind in kinds)
+        """Doubts about a scan's pose; that odometry does not know it, only for the first such scan.
+
+        Of a folder of scans that have nothing in common, that is true of almost every one.
+        """
+        for doubt in self.doubts.get(scan, ()):
+            if doubt.kind in (SOUGHT, UNLIKE.kind):
+                yield doubt
+            elif scan in self._first_lost:
+                yield replace(doubt, detail=doubt.detail + SUCH_SCANS)
 
     def _placed(self, frame: Frame, scan: Scan) -> PlacedScan:
         pose, doubts = None, []
@@ -92,6 +102,8 @@ class PlacedFrames(RecentFrames):
         if pose is None:
             registration = self._odometry.register(frame, scan)
             doubts.extend(registration.issues())
+            if not (registration.trusted or self._stretch):
+                self._first_lost.add(scan)
             self._stretch += not registration.trusted
             pose = registration.pose
         self.doubts[scan] = doubts

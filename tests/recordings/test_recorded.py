@@ -77,16 +77,22 @@ def test_without_anything_to_go_by_it_is_the_model(model) -> None:
             np.testing.assert_array_equal(judgement.probability, alone.probability)
 
 
-def test_a_scan_that_is_there_twice_is_reported_and_one_of_which_nothing_is_known_is_not(
+def test_a_scan_that_is_there_twice_is_reported_and_the_first_whose_pose_is_not_known(
     model,
 ) -> None:
+    twice, lost = "unlike the scans around it", "its pose is not known"
     first, second = (replace(frame, sensor_to_world=None) for frame in drive(2))
     elsewhere = replace(second, scan=replace(second.scan, xyz=first.scan.xyz[::-1] * 7))
-    for follower, unlike in ((replace(first, number=1), True), (second, False), (elsewhere, False)):
+    again = replace(elsewhere, number=2, scan=replace(second.scan, xyz=first.scan.xyz[::-1] * 3))
+    for followers, expected in (
+        ([replace(first, number=1)], [[twice]]),
+        ([second], [[]]),
+        ([elsewhere, again], [[lost], []]),
+    ):
         method = RecordedDerainer(model)
-        *_, last = [judgement for _, judgement, _ in judgements(method, [first, follower])]
-        kinds = [issue.kind for issue in method.issues(last)]
-        assert ("unlike the scans around it" in kinds) is unlike
+        answers = [judgement for _, judgement, _ in judgements(method, [first, *followers])][1:]
+        kinds = [[issue.kind for issue in method.issues(answer)] for answer in answers]
+        assert [[k for k in of_scan if k in (twice, lost)] for of_scan in kinds] == expected
 
 
 @pytest.mark.parametrize("wrong", ["unreadable", "empty", "nothing but NaN", "makes it fail"])
