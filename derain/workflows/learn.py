@@ -55,7 +55,8 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
 
     Raises:
         InputError: Too few scans, or too few that can be labelled; a folder that holds something
-            else; nothing to be learnt; or what a step raises. No model is left then.
+            else; nothing to be learnt; or what a step raises. A model of an earlier run stays
+            unless the export has replaced it.
     """
     source = named_frames(config.recordings, config.columns, topic=config.topic)
     if len(source) < FEWEST_SCANS:
