@@ -173,10 +173,8 @@ def doubts(results: LearnResults) -> Iterator[str]:
             "several places, if the model is to be used while driving."
         )
     yield from _doubts_of_student(results)
-    if results.warnings:
-        others = len(results.warnings) - 1
-        more = f" (and {others} more warnings)" if others else ""
-        yield f"The recording is unusual: {results.warnings[0]}{more}"
+    for warning in results.warnings:
+        yield f"The recording is unusual: {warning}"
 
 
 def _doubts_of_teacher(results: LearnResults) -> Iterator[str]:

@@ -62,7 +62,8 @@ def test_good_results_raise_no_doubt_but_that_of_units() -> None:
         (results_of(GOOD, persistence=BLIND), "At 10-20 m persistence is sure that 9.0%"),
         (results_of(GOOD, persistence=answers(10, 0, 90)), "sure of only 10%"),
         (results_of(GOOD, stood=True), "The sensor was at rest"),
-        (results_of(GOOD, GOOD, warnings=["a: far apart", "b"]), "a: far apart (and 1 more"),
+        (results_of(GOOD, GOOD, warnings=["far apart", "empty"]), "unusual: far apart"),
+        (results_of(GOOD, GOOD, warnings=["far apart", "empty"]), "unusual: empty"),
         (results_of(GOOD, answers(90_000, 900, removed=(0, 900, 0))), "found 900 points of rain"),
         (results_of(GOOD, answers(90_000, 9_000, removed=(0, 2_250, 0))), "IoU of 0.25"),
         (
