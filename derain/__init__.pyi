@@ -42,6 +42,7 @@ from derain.models.salsanext import SalsaNextNetwork as SalsaNextNetwork
 from derain.models.salsanext_lite import SalsaNextLite as SalsaNextLite
 from derain.models.salsanext_lite import SalsaNextLiteNetwork as SalsaNextLiteNetwork
 from derain.recordings.odometry import Odometry as Odometry
+from derain.recordings.persistence import Persistence as Persistence
 from derain.recordings.persistence import PersistenceDerainer as PersistenceDerainer
 from derain.scan import Scan as Scan
 from derain.sources.clean_sink import CleanSink as CleanSink

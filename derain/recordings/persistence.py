@@ -25,6 +25,10 @@ from derain.views.scan_issues import ScanIssue, intensity_in_places
 class Persistence:
     """Parameters of persistence: its window, and the odds at which it is sure.
 
+    Example:
+        >>> PersistenceDerainer(Persistence(before=2, after=0)).window
+        Window(before=2, after=0)
+
     Attributes:
         before: Scans before the one that is judged.
         after: Scans after it.
