@@ -52,9 +52,11 @@ LARGEST_LOG_ODDS = 6.0
 
 # How well intensity separates the rain of a scan from the rest where it means nothing, and where it
 # counts whole. By chance alone, intensities that are drawn anew separate snow by .006 at most, its
-# own by 1.8 or more.
+# own by 1.8 or more. FEW_DROPS over their number is added, for few drops cannot show that it means
+# nothing.
 # Source: modelling choice.
 MEANINGLESS, MEANINGFUL = 0.01, 0.02
+FEW_DROPS = 5.0
 
 # The least share of rain in a rainy scan; see ``without_intensity``.
 # Source: modelling choice.
@@ -229,9 +231,11 @@ class Cues:
         self._doubtful = doubtful
         self._cell_of_isolated = taken(cell, neighbours[0])
         self._calibration = Calibration(counts, self._cell_of_isolated)
-        separation = self._calibration(rain.clamp(-CERTAIN, CERTAIN).sigmoid()).separation
-        meaning = (separation[-1, 0] - MEANINGLESS) / (MEANINGFUL - MEANINGLESS)
-        self.meaning = meaning.clamp(0, 1)
+        by_geometry = self._calibration(rain.clamp(-CERTAIN, CERTAIN).sigmoid())
+        few = FEW_DROPS / by_geometry.rain[-1].sum().clamp_min(1)
+        excess = by_geometry.separation[-1, 0] + few - MEANINGLESS
+        differ = (counts[:, 1:].sum() > 0).double()
+        self.meaning = differ * (excess / (MEANINGFUL - MEANINGLESS)).clamp(0, 1)
         self._cell = taken(self._cell_of_isolated, doubtful)
         around = slice(1, APART[-1] + 1)
         self._others = taken_of_each(others[around], doubtful)

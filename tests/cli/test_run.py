@@ -102,7 +102,7 @@ def test_nothing_is_left_where_the_output_cannot_be_written(
         (["{model}", "scans", "--out", "scans"], "would overwrite scans/000000.bin. Give --out"),
         (["ror", "scans", "--parameters", "none.yaml"], "derain: none.yaml: there is no such"),
         (["ror", "scans", "--parameters", "dsor.yaml"], "dsor.yaml: holds parameters of dsor"),
-        (["dsor", "scans", "--parameters", "dsor.yaml"], "dsor: it has no parameter limit."),
+        (["dsor", "scans", "--set", "limit=3"], "dsor: it has no parameter limit."),
         (["dror", "scans", "--probability"], "dror returns which points are rain, without prob"),
         (["{model}", "scans", "--probability"], "000000.bin: the columns of such a file have no"),
         (["dror", "scans", "--topic", "/points"], "no bag is named"),
@@ -116,7 +116,7 @@ def test_what_cannot_be_used_is_refused_before_any_work(
     refused, onnx_model, scans, monkeypatch, arguments, reason
 ) -> None:
     monkeypatch.chdir(scans.parent)
-    Path("dsor.yaml").write_text("method: dsor\nlimit: 3\n")
+    Path("dsor.yaml").write_text("method: dsor\nneighbours: 3\n")
     words = [argument.format(model=onnx_model) for argument in arguments]
     out = [] if "--out" in words else ["--out", "out"]
     assert reason in refused("run", *words, *out)
