@@ -1,4 +1,4 @@
-"""Times and poses of the scans of a folder, from the records beside them or in the folder above.
+"""Times and poses of the scans of a folder, from the records that lie beside them.
 
 - ``times.txt``: a line a scan, seconds. Or ``metadata.csv``, see :mod:`derain.files.frame_times`.
 - ``poses.txt``: a line a scan, or poses by time; see :mod:`derain.sources.trajectory`.
@@ -16,7 +16,6 @@ from derain.files.reading import is_file, stamp_of
 from derain.scan import Floats
 from derain.sources.frame import Frame, times_of
 from derain.sources.number_lines import read_numbers
-from derain.sources.search import is_among_recordings
 from derain.sources.trajectory import CALIBRATION, Trajectory, read_trajectory
 
 TIMES, POSES = "times.txt", "poses.txt"
@@ -28,8 +27,7 @@ class Records:
     Most methods need neither, and then nothing is read, damaged or not.
 
     Args:
-        folder: The folder of scans. Its records lie in it, or in the folder that it lies in, unless
-            that holds several recordings.
+        folder: The folder of scans. Its records lie in it, or in the folder that it lies in.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -98,16 +96,10 @@ class Records:
         return line_of(path, lines, scan.name, self._places.get(scan.name), len(self._scans))
 
     def _beside(self, name: str) -> Path | None:
-        """A record in the folder of scans, or in that above it."""
+        """A record in the folder of scans or in that above it."""
         folder = self.folder.absolute()
-        beside, above = folder / name, folder.parent / name
-        if is_file(beside):
-            return beside
-        return above if is_file(above) and not self._is_among_others else None
-
-    @cached_property
-    def _is_among_others(self) -> bool:
-        return is_among_recordings(self.folder.absolute())
+        places = (folder / name, folder.parent / name)
+        return next((place for place in places if is_file(place)), None)
 
 
 @lru_cache(maxsize=16)

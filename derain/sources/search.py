@@ -8,7 +8,7 @@ from pathlib import Path
 
 from derain.bags.names import SUFFIXES as BAG_SUFFIXES
 from derain.bags.names import bags_at, is_bag, split
-from derain.cards.known import known_layouts, lidar_folders
+from derain.cards.known import known_layouts
 from derain.cards.layout import Layout
 from derain.errors import InputError, counted
 from derain.files import RECORDS, find_scans
@@ -104,14 +104,6 @@ def recordings_below(
     if found:
         _warn_of_others(folder, found)
     return found
-
-
-def is_among_recordings(folder: Path) -> bool:
-    """True if a folder of scans, no data set's, lies beside others that are not results."""
-    if folder.name in lidar_folders():
-        return False
-    others = _Search(folder, None, ())._folders_in(folder.parent)  # the folder itself is left out
-    return any(os.access(other, os.R_OK) and _holds_scans(other) for other in others)
 
 
 def _laid_out(root: Path, layouts: Sequence[Layout] | None) -> list[Path]:

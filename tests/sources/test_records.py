@@ -51,28 +51,6 @@ def test_times_lie_above_the_scans_or_beside_them(sequence, name, text) -> None:
     assert [found.time_of(scan(sequence, number)) for number in range(3)] == [0, 0.1036, 0.2]
 
 
-@pytest.mark.parametrize(
-    ("scans", "others", "known"),
-    [
-        ("drive", ["other/0.bin"], False),
-        ("drive", ["notes/log.csv"], True),
-        ("drive", ["cleaned/0.bin", "cleaned/.derain/job.json"], True),
-        ("lidar", ["classes/0.label"], True),
-        ("velodyne", ["other/0.bin"], True),
-    ],
-)
-def test_records_above_several_recordings_are_of_none(tmp_path, scans, others, known) -> None:
-    scan = tmp_path / scans / "0.bin"
-    for file in (scan, *(tmp_path / other for other in others)):
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.touch()
-    (tmp_path / "poses.txt").write_text(line(np.eye(4)))
-    (tmp_path / "times.txt").write_text("1\n")
-    found = Records(scan.parent)
-    assert (found.time_of(scan) is not None, found.pose_of(scan) is not None) == (known, known)
-    assert bool(found.stamp) == known
-
-
 def test_poses_by_time_go_to_the_scans_by_their_times(sequence) -> None:
     (sequence / "times.txt").write_text("10.0\n10.1\n10.2\n")
     (sequence / "poses.txt").write_text("9.9 0 0 0 0 0 0 1\n10.3 4 0 0 0 0 0 1\n")
