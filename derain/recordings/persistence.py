@@ -136,11 +136,12 @@ class PersistenceDerainer(PlacedMethod):
     def _evidence(self, scans: WindowOfScans) -> RayEvidence | None:
         """The evidence of the rays of the other scans; None if no scan matches."""
         scan, alike, found = scans.judged.scan, [], []
+        solid = combined_log_odds(self._points[scan], None) < 0
         for other in (*scans.before, *scans.after):
             transform = scans.judged.to(other)
             if transform is not None and len(self._points[other.scan]):
                 found.append(self._points[scan].evidence_of(self._points[other.scan], transform))
-                if is_alike(scan, other.scan, found[-1]):
+                if is_alike(scan, other.scan, found[-1][solid]):
                     alike.append(found[-1])
         if found and not alike:
             self._recent.doubts[scan].append(UNLIKE)

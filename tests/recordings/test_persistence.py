@@ -113,6 +113,17 @@ def test_no_evidence_is_taken_of_a_wrong_pose_or_of_the_same_scan_again() -> Non
         assert kinds == ["unlike the scans around it", "nothing is known for sure"]
 
 
+def test_a_scan_of_drops_for_the_most_part_matches_those_around_it() -> None:
+    before, middle, after = drive(3)
+    walls, generator = middle.scan.xyz[:-DROPS], np.random.default_rng(0)
+    wall = walls.reshape(34, -1, 3)[10:30, :15].reshape(-1, 3)
+    drops = walls[generator.choice(len(walls), 600)] * generator.uniform(0.3, 0.8, (600, 1))
+    dense = Scan.of(np.concatenate([wall, drops]).astype(np.float32))
+    answer = judged([before, replace(middle, scan=dense), after])[1]
+    assert answer.rain[len(wall) :].mean() > 0.8
+    assert answer.rain[: len(wall)].mean() < 0.01
+
+
 def test_a_registration_that_fails_is_warned_of() -> None:
     frames = drive(3, posed=False)
     nonsense = Scan.of(np.random.default_rng(0).uniform(-30, 30, (4000, 3)), "nonsense")
