@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from derain.datamodules.labelled import LabelledScans
 
 # Suffixes of the formats of pictures that commands write.
-PICTURES = (".png", ".jpg", ".pdf", ".svg", ".eps")
+PICTURES = (".png", ".jpg", ".jpeg", ".pdf", ".svg", ".eps", ".tif", ".tiff", ".webp")
 
 
 def count(text: str, least: int = 1, most: float = math.inf) -> int:
@@ -69,7 +69,8 @@ def file_named(*suffixes: str) -> Callable[[str], Path]:
     """
 
     def path(text: str) -> Path:
-        if Path(text).suffix not in suffixes:
+        suffix = Path(text).suffix
+        if suffix not in suffixes and (suffixes != PICTURES or suffix.lower() not in PICTURES):
             raise argparse.ArgumentTypeError(f"{text} does not end in {' or '.join(suffixes)}")
         return Path(text)
 
