@@ -83,8 +83,11 @@ def changed(scan: Scan) -> Iterator[tuple[str, Scan]]:
         yield f"doubled, ranges {1e3 * jitter:g} mm apart", twice
     drawn = generator.integers(0, 256, len(scan)).astype(np.float32)
     yield "intensities drawn at random", replace(scan, intensity=drawn)
-    rings = (np.arange(len(scan)) % 64).astype(np.float32)
-    yield "numbers of rows modulo 64 as intensities", replace(scan, intensity=rings)
+    rows = (np.arange(len(scan)) % 64).astype(np.float32)
+    yield "rows counted to 64 as intensities", replace(scan, intensity=rows)
+    inclination = np.arctan2(xyz[:, 2], np.hypot(xyz[:, 0], xyz[:, 1]))
+    rings = np.floor(64 * inclination.argsort().argsort() / len(scan)).astype(np.float32)
+    yield "numbers of rings as intensities", replace(scan, intensity=rings)
 
 
 def doubled(scan: Scan) -> Iterator[tuple[str, Scan]]:
