@@ -71,7 +71,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="data card with the classes and folders of a data set (default: found by its folders)",
     )
     parser.add_argument(
-        "--picture", type=file_named(*PICTURES), help="draw a folder's statistics to this file, such as .png"
+        "--picture",
+        type=file_named(*PICTURES),
+        help="draw a folder's statistics to this file, such as .png",
     )
     group = parser.add_argument_group("a folder of many scans")
     add_executor(group, "processes that count a folder's points (default: 1)")

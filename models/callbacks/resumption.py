@@ -83,8 +83,7 @@ class Resumption(lightning.Callback):
             raise InputError(
                 str(trainer.ckpt_path),
                 f"has {counted(epochs, 'epoch')} already, of {trainer.max_epochs}",
-                "Use the checkpoint as it is, raise --trainer.max_epochs, or begin a new training with it "
-                "by --start.",
+                "Use it as it is, raise --trainer.max_epochs, or begin a new training by --start.",
             )
         for found, schedule in zip(checkpoint["lr_schedulers"], own["lr_schedulers"], strict=True):
             planned, steps = found.get("total_steps"), schedule.get("total_steps")
