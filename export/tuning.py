@@ -86,13 +86,20 @@ def search_space(name: str) -> Mapping[str, Span]:
         name: One of ``FILTERS``.
 
     Raises:
-        InputError: A filter without spans, which cannot be tuned.
+        InputError: A filter without spans, which cannot be tuned, or with a span of no parameter,
+            or one that leaves out the default, from which a search starts.
     """
     space = FILTERS[name].SPACE
     if not space:
         raise InputError(
             name, "it cannot be tuned, because it has no spans to search", "Give its class a SPACE."
         )
+    default = filter_from(name, {}).as_dict()
+    for parameter, (low, high) in space.items():
+        if parameter not in default or not low <= default[parameter] <= high:
+            reason = f"its SPACE has {parameter} from {low} to {high}, where its default is "
+            reason += str(default.get(parameter, "missing"))
+            raise InputError(name, reason, "Correct the SPACE of its class.")
     return space
 
 

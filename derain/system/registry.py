@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
 from inspect import signature
 from pkgutil import iter_modules
+from threading import RLock
 from typing import Any, Generic, TypeVar, cast
 
 from derain.errors import InputError, did_you_mean
@@ -44,6 +45,7 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
         self._members: dict[str, Kind] = {}
         self._has_own = False
         self._has_others = False
+        self._importing = RLock()
 
     def add(self, *names: str) -> Callable[[Member], Member]:
         """Decorates a member, which gets these names.
@@ -104,9 +106,12 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
 
     def _import_others(self) -> None:
         """Imports the modules of other packages, once; warns of those that cannot be imported."""
-        if self._has_others:
-            return
-        self._has_others = True  # first, because one of them may list the names
+        with self._importing:  # another thread waits until all are there
+            if not self._has_others:
+                self._has_others = True  # first, because one of them may list the names
+                self._load_entry_points()
+
+    def _load_entry_points(self) -> None:
         # Imported here, because most commands never need other packages.
         from importlib.metadata import entry_points
 

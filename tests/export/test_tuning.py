@@ -108,6 +108,10 @@ def test_as_many_neighbours_are_found_as_any_trial_looks_at(monkeypatch) -> None
     for ask in (search_space, neighbours_to_find):
         with pytest.raises(InputError, match="near: it cannot be tuned"):
             ask("near")
+    for space, default in (({"width": (1.0, 2.0)}, "missing"), ({"reach": (6.0, 9.0)}, "5.0")):
+        add(**space)
+        with pytest.raises(InputError, match=f"near: its SPACE has .* default is {default}"):
+            search_space("near")
     add(reach=(0.1, 50.0))
     assert neighbours_to_find("near") == 15
     add(neighbours=(10, 30), reach=(0.1, 50.0))

@@ -3,6 +3,7 @@
 import importlib
 import sys
 from collections.abc import Callable, Iterator, Sized
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -182,3 +183,10 @@ def test_entry_points_may_be_of_another_name_than_the_package(write) -> None:
     install(write, "cobble", member("cobble"))
     assert list(items) == []
     assert "foreign_cobble" not in loaded()
+
+
+def test_a_thread_that_asks_while_another_imports_finds_all_that_there_is(things, write) -> None:
+    install(write, "cobble", "import time; time.sleep(0.2)\n" + member("cobble"))
+    with ThreadPoolExecutor(4) as threads:
+        found = list(threads.map(lambda _: list(things), range(4)))
+    assert found == 4 * [["brick", "cobble", "pebble"]]
