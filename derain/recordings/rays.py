@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.scan import Floats, Ints, Scan
+from derain.scan import Bools, Floats, Ints, Scan
 from derain.system.cores import sleeping_threads
 from derain.views.morton import distinct_rows
 
@@ -132,7 +132,7 @@ class RayEvidence:
     ending: Floats
     through: Floats
 
-    def __getitem__(self, places: slice) -> "RayEvidence":
+    def __getitem__(self, places: slice | Bools) -> "RayEvidence":
         """The evidence at some of the places."""
         return RayEvidence(self.ending[places], self.through[places])
 
