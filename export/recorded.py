@@ -83,7 +83,7 @@ class RecordedDerainer(PlacedMethod):
     def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
         """Warnings about a scan for the model, and about the scans around it."""
         yield from self.model.issues(judgement)
-        yield from self._recent.damage(judgement.scan)
+        yield from self._recent.warnings(judgement.scan)
 
     def as_dict(self) -> dict[str, Any]:
         """The model's name, its threshold, and the number of scans that it sees around one."""

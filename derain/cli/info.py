@@ -37,7 +37,7 @@ import yaml
 from derain.bags.names import in_bag, is_bag
 from derain.cli.info_file import facts_of_file
 from derain.cli.info_folder import draw, facts_of_folder
-from derain.cli.options import PICTURES, add_columns, add_topic, file_named
+from derain.cli.options import add_columns, add_topic, picture
 from derain.cli.outputs import print_lines
 from derain.cli.unit_options import add_executor, add_shard, executor_of
 from derain.default import DEFAULT, ModelCard, default_model, model_card
@@ -72,7 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--picture",
-        type=file_named(*PICTURES),
+        type=picture,
         help="draw a folder's statistics to this file, such as .png",
     )
     group = parser.add_argument_group("a folder of many scans")

@@ -61,6 +61,12 @@ def column_names(text: str) -> tuple[str, ...]:
     return tuple(text.split(","))
 
 
+def picture(text: str) -> Path:
+    """A picture to write, whose suffix may be in capitals."""
+    file_named(*PICTURES)(text.lower())
+    return Path(text)
+
+
 def file_named(*suffixes: str) -> Callable[[str], Path]:
     """A file to write, with a suffix that other commands accept.
 
@@ -69,8 +75,7 @@ def file_named(*suffixes: str) -> Callable[[str], Path]:
     """
 
     def path(text: str) -> Path:
-        suffix = Path(text).suffix
-        if suffix not in suffixes and (suffixes != PICTURES or suffix.lower() not in PICTURES):
+        if Path(text).suffix not in suffixes:
             raise argparse.ArgumentTypeError(f"{text} does not end in {' or '.join(suffixes)}")
         return Path(text)
 

@@ -66,9 +66,7 @@ def add_arguments(parser: Parser) -> None:
         metavar="[TITLE=]METHOD",
         help="methods to compare (default: default, the model that comes with derain)",
     )
-    parser.add_argument(
-        "--out", type=options.file_named(*options.PICTURES), help="picture to write, such as .png"
-    )
+    parser.add_argument("--out", type=options.picture, help="picture to write, such as .png")
     parser.add_argument("--window", action="store_true", help="open a window for each method")
     parser.add_argument(
         "--rerun", type=Path, metavar="FILE", help="Rerun file to write (.rrd), for a recording"

@@ -53,7 +53,7 @@ def example_scan(weather: Literal["rain", "snow"] = "snow") -> Scan:
         x, y, z in metres as seen from the sensor, intensities from 0 to 255, and labels.
 
     Raises:
-        InputError: Another precipitation.
+        InputError: Another weather.
     """
     scan = read_scan(example_file(weather))
     labels = example_file(weather).parents[1] / "lidar_radar_labels" / "000000.label"

@@ -114,19 +114,21 @@ def surroundings_features(points: ScanPoints) -> Floats:
     return np.stack([np.ones_like(apart), apart, rough, far, *products], axis=1)
 
 
-def combined_log_odds(points: ScanPoints, evidence: RayEvidence | None) -> Floats:
+def surroundings_log_odds(points: ScanPoints) -> Floats:
+    """Log-odds of rain of each of M points by its surroundings alone, float64 (M,)."""
+    return np.asarray(surroundings_features(points) @ np.array(SURROUNDINGS_WEIGHTS))
+
+
+def combined_log_odds(surroundings: Floats, evidence: RayEvidence) -> Floats:
     """Log-odds of rain of each point without its neighbours' votes, float64 (M,).
 
     Args:
-        points: M points of a scan.
-        evidence: That of the rays of other scans; None where there is no other scan.
+        surroundings: Those by the surroundings of M points, float64 (M,).
+        evidence: That of the rays of other scans.
     """
-    log_odds: Floats = surroundings_features(points) @ np.array(SURROUNDINGS_WEIGHTS)
-    if evidence is None:
-        return log_odds
     any_point, ending, through = RAY_WEIGHTS
     by_rays = any_point + ending * evidence.ending + through * evidence.through
-    return log_odds + by_rays - PRIOR
+    return surroundings + by_rays - PRIOR
 
 
 def vote(points: ScanPoints, log_odds: Floats) -> Floats:

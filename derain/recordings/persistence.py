@@ -8,7 +8,12 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from derain.files.documents import Entry
-from derain.recordings.evidence import ScanPoints, combined_log_odds, vote
+from derain.recordings.evidence import (
+    ScanPoints,
+    combined_log_odds,
+    surroundings_log_odds,
+    vote,
+)
 from derain.recordings.placing import UNLIKE, PlacedFrames, PlacedMethod, is_alike
 from derain.recordings.rays import RayEvidence, mean_evidence
 from derain.scan import Bools, Floats, Scan
@@ -123,8 +128,10 @@ class PersistenceDerainer(PlacedMethod):
                     self._points[one.scan] = ScanPoints(one.scan, self.threads)
         points = self._points[scan]
         with stopwatch.stage("network"):
-            evidence = self._evidence(scans)
-            alone = combined_log_odds(points, evidence)
+            alone = surroundings_log_odds(points)
+            evidence = self._evidence(scans, alone < 0)
+            if evidence is not None:
+                alone = combined_log_odds(alone, evidence)
             agreed = vote(points, alone)
             sure = np.log(self.persistence.sure)
             surely_rain = (alone > sure) & (agreed > sure)
@@ -133,10 +140,14 @@ class PersistenceDerainer(PlacedMethod):
         with stopwatch.stage("back"):
             return _by_row(scan, points, agreed, known, frame)
 
-    def _evidence(self, scans: WindowOfScans) -> RayEvidence | None:
-        """The evidence of the rays of the other scans; None if no scan matches."""
+    def _evidence(self, scans: WindowOfScans, solid: Bools) -> RayEvidence | None:
+        """The evidence of the rays of the other scans; None if no scan matches.
+
+        Args:
+            scans: The scan that is judged, and those around it.
+            solid: True for points of it that are solid by their surroundings, bool (M,).
+        """
         scan, alike, found = scans.judged.scan, [], []
-        solid = combined_log_odds(self._points[scan], None) < 0
         for other in (*scans.before, *scans.after):
             transform = scans.judged.to(other)
             if transform is not None and len(self._points[other.scan]):

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
-from weakref import WeakKeyDictionary, WeakSet
+from weakref import WeakKeyDictionary, ref
 
 import numpy as np
 
@@ -53,7 +53,7 @@ class PlacedFrames(RecentFrames):
         self._odometry = FrameOdometry(threads)
         self.doubts: WeakKeyDictionary[Scan, list[ScanIssue]] = WeakKeyDictionary()
         self._stretch = 0
-        self._first_lost: WeakSet[Scan] = WeakSet()  # at most one scan
+        self._first_lost: ref[Scan] | None = None  # of this recording
         self._has_poses: bool | None = None  # whether the last frame had a pose; None before any
 
     def place(self, frame: Frame | Scan | Array, stopwatch: Stopwatch) -> WindowOfScans | None:
@@ -77,7 +77,7 @@ class PlacedFrames(RecentFrames):
             placed = self._placed(frame, scan)
         return self.push(placed)
 
-    def damage(self, scan: Scan) -> Iterator[ScanIssue]:
+    def warnings(self, scan: Scan) -> Iterator[ScanIssue]:
         """Doubts about a scan's pose; that odometry does not know it, only for the first such scan.
 
         Of a folder of scans that have nothing in common, that is true of almost every one.
@@ -85,7 +85,7 @@ class PlacedFrames(RecentFrames):
         for doubt in self.doubts.get(scan, ()):
             if doubt.kind in (SOUGHT, UNLIKE.kind):
                 yield doubt
-            elif scan in self._first_lost:
+            elif self._first_lost is not None and self._first_lost() is scan:
                 yield replace(doubt, detail=doubt.detail + SUCH_SCANS)
 
     def _placed(self, frame: Frame, scan: Scan) -> PlacedScan:
@@ -96,14 +96,17 @@ class PlacedFrames(RecentFrames):
             detail = f"its pose is not known, and is computed from the scans: {error}"
             doubts.append(ScanIssue(SOUGHT, detail))
         has_pose = pose is not None
-        if self.starts_new_recording(frame) or self._has_poses not in (None, has_pose):
+        starts = self.starts_new_recording(frame)
+        if starts:
+            self._first_lost = None
+        if starts or self._has_poses not in (None, has_pose):
             self._stretch += 1  # another world
         self._has_poses = has_pose
         if pose is None:
             registration = self._odometry.register(frame, scan)
             doubts.extend(registration.issues())
-            if not (registration.trusted or self._stretch):
-                self._first_lost.add(scan)
+            if not registration.trusted and self._first_lost is None:
+                self._first_lost = ref(scan)
             self._stretch += not registration.trusted
             pose = registration.pose
         self.doubts[scan] = doubts

@@ -37,9 +37,10 @@ VERSIONS = (
     "created",
 )
 
-# Errors that the next try would meet again, and those that refuse access. Those of botocore are
-# known by their names, for it may not be installed.
-FINAL = ("IsADirectoryError", "NotImplementedError", "ParamValidationError")
+# Errors that the next try would meet again; and those of botocore that are so, or that refuse
+# access, by their names, for it may not be installed.
+FINAL = (IsADirectoryError, NotImplementedError)
+WRONG_PARAMETERS = "ParamValidationError"
 REFUSALS = ("NoCredentialsError", "PartialCredentialsError", "ProfileNotFound")
 
 # The status of an answer of a web server after which another request may succeed.
@@ -242,7 +243,8 @@ def _refusal(url: str, error: Exception) -> InputError | None:
             f"the store refuses access ({_reason(url, error)})",
             "Check the credentials that its library finds in the environment.",
         )
-    return _failed(url, error) if type(error).__name__ in FINAL else None
+    is_final = isinstance(error, FINAL) or type(error).__name__ == WRONG_PARAMETERS
+    return _failed(url, error) if is_final else None
 
 
 def _is_missing(error: FileNotFoundError) -> bool:

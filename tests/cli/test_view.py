@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from derain.cli.options import PICTURES, file_named
+from derain.cli.options import picture
 from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
 from derain.files import read_scan
@@ -87,4 +87,4 @@ def test_points_that_nobody_knows_are_not_judged(succeed, scan, tmp_path, saved_
 
 
 def test_the_suffix_of_a_picture_may_be_in_capitals() -> None:
-    assert file_named(*PICTURES)("view.PNG") == Path("view.PNG")
+    assert picture("view.PNG") == Path("view.PNG")

@@ -10,6 +10,7 @@ from derain.recordings.evidence import (
     ScanPoints,
     combined_log_odds,
     surroundings_features,
+    surroundings_log_odds,
     vote,
 )
 from derain.recordings.rays import RayEvidence
@@ -32,7 +33,7 @@ def test_lonely_points_in_the_air_look_like_rain_and_walls_do_not() -> None:
     generator = np.random.default_rng(0)
     drops = generator.uniform((3, -4, -1), (8, 4, 1), (60, 3))
     points = points_of(np.concatenate([wall(20, 60, 160), drops]))
-    log_odds = combined_log_odds(points, None)  # no other scan: the surroundings decide
+    log_odds = surroundings_log_odds(points)  # no other scan: the surroundings decide
     of_drops = points.xyz[:, 0] < 19
     assert (log_odds[of_drops] > 0).mean() > 0.9
     assert (log_odds[~of_drops] < 0).mean() > 0.99
@@ -60,5 +61,5 @@ def test_rays_that_are_as_those_of_any_point_change_nothing() -> None:
     any_point, ending, _ = RAY_WEIGHTS
     share = np.full(len(points), (PRIOR - any_point) / ending)
     usual = RayEvidence(share, np.zeros(len(points)))
-    alone = combined_log_odds(points, None)
-    assert combined_log_odds(points, usual) == pytest.approx(alone)
+    alone = surroundings_log_odds(points)
+    assert combined_log_odds(alone, usual) == pytest.approx(alone)

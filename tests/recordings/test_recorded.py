@@ -77,22 +77,25 @@ def test_without_anything_to_go_by_it_is_the_model(model) -> None:
             np.testing.assert_array_equal(judgement.probability, alone.probability)
 
 
+@pytest.mark.parametrize("delay", [0, 1])
 def test_a_scan_that_is_there_twice_is_reported_and_the_first_whose_pose_is_not_known(
-    model,
+    model, delay
 ) -> None:
     twice, lost = "unlike the scans around it", "its pose is not known"
     first, second = (replace(frame, sensor_to_world=None) for frame in drive(2))
     elsewhere = replace(second, scan=replace(second.scan, xyz=first.scan.xyz[::-1] * 7))
     again = replace(elsewhere, number=2, scan=replace(second.scan, xyz=first.scan.xyz[::-1] * 3))
+    others = [replace(frame, sequence="another") for frame in (first, elsewhere)]
     for followers, expected in (
         ([replace(first, number=1)], [[twice]]),
         ([second], [[]]),
         ([elsewhere, again], [[lost], []]),
+        ([elsewhere, *others], [[lost], [], [lost]]),
     ):
-        method = RecordedDerainer(model)
-        answers = [judgement for _, judgement, _ in judgements(method, [first, *followers])][1:]
-        kinds = [[issue.kind for issue in method.issues(answer)] for answer in answers]
-        assert [[k for k in of_scan if k in (twice, lost)] for of_scan in kinds] == expected
+        method, kinds = RecordedDerainer(model, 1, delay), []
+        for _, judgement, _ in judgements(method, [first, *followers]):
+            kinds.append([issue.kind for issue in method.issues(judgement)])
+        assert [[k for k in of_scan if k in (twice, lost)] for of_scan in kinds[1:]] == expected
 
 
 @pytest.mark.parametrize("wrong", ["unreadable", "empty", "nothing but NaN", "makes it fail"])
